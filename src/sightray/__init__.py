@@ -1,0 +1,1 @@
+"""Sightray: a fast, readable ray tracer for Python."""

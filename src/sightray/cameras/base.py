@@ -1,0 +1,98 @@
+"""The contract of cameras.
+
+A camera turns continuous pixel coordinates into rays of sight in the world. The image spans [0, width] x [0, height],
+row 0 is on top, and the centre of the top-left pixel is (0.5, 0.5). The camera's own frame is OpenCV's: +x right,
++y down, +z forward.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sightray._jit import implements, method
+from sightray.errors import SceneError
+from sightray.fields import derived_vector, integer
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table, vec3_at
+from sightray.mathlib.vec import Vec3, normalize
+from sightray.registry import Member
+
+MAX_SIDE = 65_536
+
+
+class Ray(NamedTuple):
+    """A ray of sight: unit direction."""
+
+    origin: Vec3
+    direction: Vec3
+
+
+class Camera(Member, family="cameras"):
+    """Base of all cameras."""
+
+    width: int = integer("image width", default=640, at_least=1, at_most=MAX_SIDE, unit="pixels")
+    height: int = integer("image height", default=480, at_least=1, at_most=MAX_SIDE, unit="pixels")
+
+
+@method(0)
+def generate_ray(camera: Table, x: f64, y: f64) -> Ray:
+    """The ray of sight through continuous pixel coordinates."""
+    raise NotImplementedError
+
+
+class _Pinhole(Camera):
+    """Perspective cameras in any parametrisation: all rays leave the eye, directions are linear in the pixel.
+
+    Subclasses state `pose` and `window`; direction = corner + x * right + y * down.
+    """
+
+    _eye: Any = derived_vector("centre of projection", lambda c: c.world_from_camera()[:3, 3])
+    _corner: Any = derived_vector("direction to the top-left corner", lambda c: c.plane()[0])
+    _right: Any = derived_vector("change of direction by one pixel to the right", lambda c: c.plane()[1])
+    _down: Any = derived_vector("change of direction by one pixel down", lambda c: c.plane()[2])
+
+    def world_from_camera(self) -> np.ndarray:
+        """Pose, (4, 4) float64: columns +x right, +y down, +z forward, and the eye."""
+        raise NotImplementedError
+
+    def intrinsics(self) -> np.ndarray:
+        """Matrix K, (3, 3) float64, pixels: ``[u, v, 1] ~ K @ p_camera``, top-left pixel centre at (0.5, 0.5)."""
+        raise NotImplementedError
+
+    def plane(self) -> np.ndarray:
+        """Directions to the corner, and by one pixel right and down: (3, 3) float64, a row each, world."""
+        inverse = np.linalg.inv(self.intrinsics())
+        columns = self.world_from_camera()[:3, :3] @ inverse
+        return np.stack([columns[:, 2], columns[:, 0], columns[:, 1]])
+
+
+_EYE, _CORNER, _RIGHT, _DOWN = _Pinhole.offsets()[2:]
+
+
+@implements(generate_ray, _Pinhole)
+def generate_pinhole_ray(camera: Table, x: f64, y: f64) -> Ray:
+    d = vec3_at(camera, _CORNER) + vec3_at(camera, _RIGHT) * x + vec3_at(camera, _DOWN) * y
+    return Ray(vec3_at(camera, _EYE), normalize(d))
+
+
+def look_at(eye: Any, target: Any, up: Any, who: str) -> np.ndarray:
+    """Camera pose, (4, 4): +z from `eye` to `target`, -y as near to `up` as can be.
+
+    Raises
+    ------
+    SceneError
+        If eye and target coincide, or `up` is parallel to the line of sight.
+    """
+    forward = np.asarray(target, np.float64) - np.asarray(eye, np.float64)
+    if not forward.any():
+        raise SceneError(f"{who}: eye and target are the same point {tuple(eye)}; allowed: two different points")
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    if np.linalg.norm(right) <= 1e-12 * np.linalg.norm(up):
+        raise SceneError(f"{who}: up {tuple(up)} is parallel to the line of sight; allowed: any other direction")
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(forward, right), forward, eye
+    return pose

@@ -1,0 +1,1 @@
+"""Integrators: what light comes along a ray of sight. `integrators.base` states what each one promises."""

@@ -1,0 +1,1 @@
+"""Lights. `lights.base` states what each one promises."""

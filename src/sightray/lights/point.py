@@ -1,0 +1,38 @@
+"""A light without extent."""
+
+from __future__ import annotations
+
+from sightray._jit import implements
+from sightray.errors import SceneError
+from sightray.fields import Color, Point, color, vector
+from sightray.lights.base import Light, LightSample, illuminate
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, vec3_at
+from sightray.mathlib.vec import Vec3, length
+
+
+class PointLight(Light):
+    """Sends `intensity` equally in all directions.
+
+    What arrives at distance r is ``intensity / (c + l r + q r²)``: the inverse square law by default, or the constant,
+    linear and quadratic attenuation of older graphics systems.
+    """
+
+    position: Point = vector("where it stands", unit="m")
+    intensity: Color = color("radiant intensity", default=1.0, unit="W/sr")
+    attenuation: Point = vector("constant, linear and quadratic coefficient", default=(0.0, 0.0, 1.0))
+
+    def check(self) -> None:
+        if min(self.attenuation) < 0 or max(self.attenuation) <= 0:
+            raise SceneError(f"PointLight.attenuation: got {self.attenuation}; allowed: numbers >= 0, not all zero")
+
+
+POSITION, INTENSITY, ATTENUATION = PointLight.offsets()
+
+
+@implements(illuminate, PointLight)
+def illuminate_from_point(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
+    to_light = vec3_at(light, POSITION) - p
+    r = length(to_light)
+    c = vec3_at(light, ATTENUATION)
+    return LightSample(to_light / r, r, vec3_at(light, INTENSITY) / (c.x + c.y * r + c.z * r * r))

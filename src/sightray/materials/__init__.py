@@ -1,0 +1,1 @@
+"""Materials: what surfaces do with light. `materials.base` states what each one promises."""

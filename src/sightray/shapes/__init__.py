@@ -1,0 +1,1 @@
+"""Shapes: surfaces that rays meet. `shapes.base` states what each one promises."""

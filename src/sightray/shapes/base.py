@@ -1,0 +1,75 @@
+"""The contract of shapes.
+
+A shape lives in its own object space. Rays come to it by the inverse transform, with a direction that is *not*
+normalised, so that the ray parameter t is the same number in both spaces. A shape
+
+- reports in `intersect` the nearest hit with ``t_min < t < t_max``, or `miss()`;
+- answers in `occluded` whether there is any (by default through `intersect`);
+- describes in `surface` the point that was hit: outward normal, shading normal, texture coordinates, tangent;
+- states in `bounds` a box in object space that contains it; infinite for surfaces without end.
+
+Intersections are computed in double precision. A `Hit` carries what `surface` needs beside the point: which
+primitive or part was met, and up to two numbers of the shape's own choice.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sightray._jit import implements, method
+from sightray.fields import child, other, text
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table
+from sightray.mathlib.transform import Transform
+from sightray.mathlib.vec import Vec3
+from sightray.registry import Member
+from sightray.shapes.hit import Hit, is_hit
+
+
+class Surface(NamedTuple):
+    """A point of a surface, in the space of the shape; vectors need not be normalised."""
+
+    normal: Vec3  # geometric, outward
+    shading: Vec3  # the normal that lighting uses
+    u: f64
+    v: f64
+    tangent: Vec3  # derivative of the point by u
+
+
+class Shape(Member, family="shapes"):
+    """Base of all shapes."""
+
+    material: Any = child("what it is made of; None for a grey matte", "materials", default=None, optional=True, packed=False)
+    transform: Transform = other(
+        "object to world", Transform, default=None, plain=lambda t: None if t.is_identity else t.matrix.tolist()
+    )
+    name: str = text("label for people and datasets", default="")
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of a box around the shape, in object space: two (3,) float64 arrays."""
+        raise NotImplementedError(f"{type(self).__name__} does not state its bounds")
+
+
+@method(0)
+def intersect(shape: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Hit:
+    """Nearest hit of the ray o + t d with t_min < t < t_max, in object space."""
+    raise NotImplementedError
+
+
+@method(1)
+def occluded(shape: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
+    """Whether the ray o + t d meets the shape with t_min < t < t_max."""
+    raise NotImplementedError
+
+
+@method(2)
+def surface(shape: Table, hit: Hit, p: Vec3) -> Surface:
+    """The surface at the point p of a hit, in object space."""
+    raise NotImplementedError
+
+
+@implements(occluded, Shape)
+def occluded_through_intersect(shape: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
+    return is_hit(intersect(shape, o, d, t_min, t_max))

@@ -1,0 +1,1 @@
+"""Textures: colours that vary over a surface. `textures.base` states what each one promises."""

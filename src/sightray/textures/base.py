@@ -1,0 +1,62 @@
+"""The contract of textures: a linear colour for every point of a surface."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from sightray._jit import method
+from sightray.errors import SceneError
+from sightray.fields import REQUIRED, Child, ColorField, Packer
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table
+from sightray.mathlib.vec import Vec3
+from sightray.registry import Member
+
+
+class Where(NamedTuple):
+    """Where on a surface a texture or material is asked."""
+
+    u: f64  # texture coordinates; v runs upwards
+    v: f64
+    p: Vec3  # the point in the space of the shape, so that solid textures move with it
+
+
+class Texture(Member, family="textures"):
+    """Base of all textures."""
+
+
+@method(0)
+def texture_value(texture: Table, where: Where) -> Vec3:
+    """Linear colour at a place."""
+    raise NotImplementedError
+
+
+class Textured(Child):
+    """A colour or a texture; kernels always see a texture."""
+
+    def __init__(self, doc: str, default: Any = REQUIRED, *, at_most: float = float("inf")):
+        super().__init__(doc, "textures", default)
+        self._color = ColorField(doc, at_most=at_most)
+
+    def convert(self, value: Any) -> Any:
+        if isinstance(value, Texture):
+            return value
+        if isinstance(value, Member):
+            raise SceneError(f"got {value!r}; allowed: {self.allowed()}")
+        return self._color.convert(value)
+
+    def pack(self, row: Table, word: int, value: Any, packer: Packer) -> None:
+        from sightray.textures.constant import Constant
+
+        super().pack(row, word, value if isinstance(value, Texture) else Constant(color=value), packer)
+
+    def plain(self, value: Any) -> Any:
+        return value if isinstance(value, Texture) else self._color.plain(value)
+
+    def allowed(self) -> str:
+        return f"{self._color.allowed()}, or a texture"
+
+
+def textured(doc: str, default: Any = REQUIRED, *, at_most: float = float("inf")) -> Any:
+    """A linear colour, or a texture that gives one."""
+    return Textured(doc, default, at_most=at_most)

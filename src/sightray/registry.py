@@ -27,7 +27,8 @@ else:
         return lambda cls: cls
 
 
-FAMILIES = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters", "scene")
+FAMILIES = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters", "scene",
+            "accelerators")
 _members: dict[str, dict[str, type[Member]]] = {name: {} for name in FAMILIES}
 
 

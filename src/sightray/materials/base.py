@@ -27,6 +27,7 @@ PHONG, BLINN = 0, 1
 class Local(NamedTuple):
     """How a surface answers light at a point, in Whitted's terms; see the formula of this module."""
 
+    color: Vec3  # plain colour, as ray casting without lights shows it
     emission: Vec3
     ambient: Vec3
     diffuse: Vec3

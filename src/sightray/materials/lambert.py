@@ -29,5 +29,5 @@ def local_of_lambert(material: Table, where: Where, cos_view: f64) -> Local:
     albedo = texture_value(table_at(material, ALBEDO), where)
     zero = grey(0.0)
     return Local(
-        vec3_at(material, EMISSION), albedo, albedo * (1.0 / math.pi), zero, 0.0, PHONG, zero, zero, 1.0, zero
+        albedo, vec3_at(material, EMISSION), albedo, albedo * (1.0 / math.pi), zero, 0.0, PHONG, zero, zero, 1.0, zero
     )  # fmt: skip

@@ -1,0 +1,1 @@
+"""The engine: how any integrator is run over all pixels, in tiles, on all cores."""

@@ -1,0 +1,1 @@
+"""Film: where samples gather and become a picture."""

@@ -1,0 +1,176 @@
+"""The gate between objects and kernels: a `Scene` becomes tables here and nowhere else."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sightray import _jit
+from sightray.errors import SceneError
+from sightray.lights.base import Light
+from sightray.materials.lambert import Lambert
+from sightray.mathlib.table import Space, Table, aligned, link, set_methods
+from sightray.mathlib.transform import Transform, put_columns
+from sightray.registry import Member
+from sightray.scene import items as item_row
+from sightray.scene import world as world_row
+from sightray.scene.instance import Group, Instance
+from sightray.scene.scene import Scene
+from sightray.shapes.base import Shape
+
+DEFAULT_MATERIAL = Lambert(albedo=0.5)
+Report = Callable[[int, int, str], None]  # kernels compiled, kernels to compile, name of the next
+
+
+class Item(NamedTuple):
+    """One shape at one place."""
+
+    shape: Shape
+    material: Member
+    transform: Transform
+    object: int  # index of the scene's object that it belongs to
+    name: str
+
+
+class Tables:
+    """Rows of members, packed once each, and filled with the methods that a kernel can reach."""
+
+    def __init__(self) -> None:
+        self.space = Space()
+        self._rows: dict[int, tuple[Member, Table]] = {}
+        self._ready: set[tuple[Callable, bool]] = set()
+
+    def row_of(self, member: Member) -> Table:
+        """The row of a member; packed on first use. The member is kept alive, so its id stays its own."""
+        known = self._rows.get(id(member))
+        if known is None:
+            row = self.space.row(member.row_words())
+            known = self._rows[id(member)] = (member, row)
+            member.pack(row, self)
+        return known[1]
+
+    def add(self, member: Member, row: Table) -> None:
+        """Know a row that was packed elsewhere."""
+        self._rows[id(member)] = (member, row)
+
+    def prepare(self, root: Callable, report: Report | None = None, compiled: bool | None = None) -> None:
+        """Fill in the methods that the kernel `root` can reach, compiling what the cache does not have."""
+        compiled = _jit.enabled() if compiled is None else compiled
+        if (root, compiled) in self._ready:
+            return
+        rows = list(self._rows.values())
+        needed = _jit.needed_kernels(root, dict.fromkeys(type(member) for member, _ in rows))
+        kernels = list(dict.fromkeys(itertools.chain([root], *(slots.values() for slots in needed.values()))))
+        if compiled:
+            missing = [k for k in kernels if not _jit.is_compiled(k)]
+            for index, function in enumerate(missing):
+                if report is not None:
+                    report(index, len(missing), function.__name__)
+                _jit.address(function)
+            if report is not None and missing:
+                report(len(missing), len(missing), "")
+        addresses = {k: _jit.address(k) if compiled else 0 for k in kernels}
+        for member, row in rows:
+            set_methods(row, [(slot, k, addresses[k]) for slot, k in needed[type(member)].items()])
+        self._ready.add((root, compiled))
+
+
+class Compiled:
+    """A scene as tables: `world` for kernels, `items` for people who ask what item number 7 is."""
+
+    def __init__(self, scene: Scene, accelerator: Any):
+        self.scene = scene
+        self.tables = Tables()
+        self.items = list(flatten(scene))
+        self.world = self._pack(accelerator)
+
+    def _pack(self, accelerator: Any) -> Table:
+        tables, scene, space = self.tables, self.scene, self.tables.space
+        items = space.array(aligned(max(1, len(self.items)) * item_row.ITEM_WORDS, np.float64))
+        lower, upper = self._pack_items(items)
+        tree = accelerator.build(space, items, lower, upper)
+        tables.add(accelerator, tree)
+        lights = space.row(max(1, len(scene.lights)))
+        for index, light in enumerate(scene.lights):
+            link(lights, index, tables.row_of(light))
+        world = space.row(world_row.WORLD_WORDS)
+        link(world, world_row.TREE, tree)
+        link(world, world_row.ITEMS, items)
+        link(world, world_row.LIGHTS, lights)
+        world.view(np.int64)[world_row.LIGHT_COUNT] = len(scene.lights)
+        if scene.camera is not None:
+            link(world, world_row.CAMERA, tables.row_of(scene.camera))
+        numbers = world.view(np.float64)
+        numbers[world_row.BACKGROUND : world_row.BACKGROUND + 3] = scene.background
+        numbers[world_row.AMBIENT : world_row.AMBIENT + 3] = scene.ambient
+        return world
+
+    def _pack_items(self, items: Table) -> tuple[np.ndarray, np.ndarray]:
+        integers = items.view(np.int64)
+        lower, upper = np.empty((2, len(self.items), 3))
+        for index, item in enumerate(self.items):
+            start = index * item_row.ITEM_WORDS
+            integers[start + item_row.SHAPE] = self.tables.row_of(item.shape).address
+            integers[start + item_row.MATERIAL] = self.tables.row_of(item.material).address
+            integers[start + item_row.MOVED] = not item.transform.is_identity
+            integers[start + item_row.OBJECT] = item.object
+            put_columns(items, start + item_row.OBJECT_FROM_WORLD, item.transform.inverse)
+            put_columns(items, start + item_row.WORLD_FROM_OBJECT, item.transform.matrix)
+            lower[index], upper[index] = world_bounds(item)
+        return lower, upper
+
+
+def compile_scene(scene: Scene, accelerator: Any = None) -> Compiled:
+    """The tables of a scene; kept with it, so that the next call is free."""
+    if accelerator is None:
+        from sightray.accelerators.bvh import Bvh
+
+        accelerator = Bvh()
+    cache: dict[str, Compiled] = scene._compiled  # type: ignore[attr-defined]
+    key = repr(accelerator)
+    if key not in cache:
+        cache[key] = Compiled(scene, accelerator)
+    return cache[key]
+
+
+def flatten(scene: Scene) -> Iterator[Item]:
+    """Every shape of the scene with its place in the world: groups opened, instances followed."""
+    for index, thing in enumerate(scene.objects):
+        if isinstance(thing, Light):
+            thing = thing.shape()
+        if thing is not None:
+            yield from _flatten(thing, Transform(), None, index, "")
+
+
+def _flatten(thing: Any, place: Transform, material: Member | None, index: int, name: str) -> Iterator[Item]:
+    here = place if thing.transform.is_identity else place @ thing.transform
+    name = name or thing.name
+    if isinstance(thing, Group):
+        for part in thing.objects:
+            yield from _flatten(part, here, material, index, name)
+    elif isinstance(thing, Instance):
+        yield from _flatten(thing.of, here, material or thing.material, index, name)
+    else:
+        yield Item(thing, material or thing.material or DEFAULT_MATERIAL, here, index, name)
+
+
+def world_bounds(item: Item) -> tuple[np.ndarray, np.ndarray]:
+    """Box around an item in the world: the box of the transformed corners; infinite stays infinite."""
+    lower, upper = item.shape.bounds()
+    if item.transform.is_identity or not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        finite = item.transform.is_identity
+        return (lower, upper) if finite else (np.full(3, -np.inf), np.full(3, np.inf))
+    # Interval arithmetic of an affine map (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).
+    m = item.transform.matrix
+    a, b = m[:3, :3] * lower, m[:3, :3] * upper
+    return m[:3, 3] + np.minimum(a, b).sum(1), m[:3, 3] + np.maximum(a, b).sum(1)
+
+
+def require_camera(scene: Scene) -> Any:
+    """The scene's camera, or a `SceneError`."""
+    if scene.camera is None:
+        raise SceneError("Scene.camera: missing; a picture needs one, such as PerspectiveCamera(eye=..., target=...)")
+    return scene.camera

@@ -1,0 +1,65 @@
+"""The world as kernels see it: one row that points at everything, and the questions that integrators ask of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sightray._jit import kernel
+from sightray.accelerators.base import blocked, closest
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, i64_at, table_at
+from sightray.mathlib.vec import Vec3, dot, normalize
+from sightray.scene.items import MATERIAL, ItemHit, item_at, item_surface, to_object
+from sightray.textures.base import Where
+
+TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4
+BACKGROUND, AMBIENT = 8, 12
+WORLD_WORDS = 16
+
+
+class Point(NamedTuple):
+    """A point of a surface that a ray has met, in the world."""
+
+    p: Vec3
+    normal: Vec3  # unit, geometric, outward
+    shading: Vec3  # unit
+    cos_view: f64  # of the viewer and the shading normal; negative when seen from inside
+    material: Table
+    where: Where
+
+
+@kernel
+def find_closest(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemHit:
+    """Nearest hit of a ray with the scene."""
+    return closest(table_at(world, TREE), o, d, t_min, t_max)
+
+
+@kernel
+def is_blocked(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
+    """Whether anything stands between t_min and t_max."""
+    return blocked(table_at(world, TREE), o, d, t_min, t_max)
+
+
+@kernel
+def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3) -> Point:
+    """All that shading needs to know of a hit."""
+    item = item_at(table_at(world, ITEMS), hit.item)
+    p = o + d * hit.t
+    p_object = to_object(item, p)
+    s = item_surface(item, hit, p_object)
+    shading = normalize(s.shading)
+    return Point(
+        p, normalize(s.normal), shading, -dot(shading, d), table_at(item, MATERIAL), Where(s.u, s.v, p_object)
+    )  # fmt: skip
+
+
+@kernel
+def light_at(world: Table, index: i64) -> Table:
+    """Row of light number `index`."""
+    return table_at(table_at(world, LIGHTS), index)
+
+
+@kernel
+def light_count(world: Table) -> i64:
+    """Number of lights."""
+    return i64_at(world, LIGHT_COUNT)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sightray.engine.explain import Explanation
 from sightray.engine.progress import Callback
 from sightray.errors import SceneError
 from sightray.images import Image
@@ -59,7 +60,6 @@ def render(
     from sightray.engine.adaptive import where_neighbours_differ
     from sightray.engine.run import run
     from sightray.filters.gaussian import Gaussian
-    from sightray.filters.table import build_table
     from sightray.integrators.whitted import Whitted
     from sightray.scene.compile import compile_scene, require_camera
 
@@ -77,7 +77,7 @@ def render(
     require_camera(scene)
     outcome = run(
         compile_scene(scene, _member(accelerator, "accelerators", "accelerator")), integrator,
-        build_table(_member(filter, "filters", "filter") or Gaussian()),
+        _member(filter, "filters", "filter") or Gaussian(),
         samples=samples, seed=seed, threads=threads, progress=progress, refine=refine,
     )  # fmt: skip
     if not outcome.complete and not partial_ok:
@@ -120,3 +120,40 @@ def load(path: str | Path, **limits: Any) -> Scene:
     if str(path) in scenes.names():
         return scenes.build(str(path))
     return load_scene(path, **limits)
+
+
+def explain(scene: Scene, *, pixel: tuple[int, int], integrator: Member | None = None, seed: int = 0) -> Explanation:
+    """The tree of rays behind one pixel, with numbers: print it.
+
+    Parameters
+    ----------
+    scene : what to see; it must have a camera.
+    pixel : (column, row), from the top-left.
+    integrator : by default the scene's own, else `Whitted`.
+    seed : as for `render`.
+
+    Returns
+    -------
+    Explanation
+        Its text shows every ray of the pixel-centre sample: what it met, what each light gave, each term; ``color`` is
+        their weighted sum and the pixel of a picture with one sample.
+    """
+    from sightray.engine.explain import explain_pixel
+    from sightray.integrators.whitted import Whitted
+    from sightray.scene.compile import compile_scene
+
+    _expect(scene, Scene, "explain", "scene")
+    try:
+        column, row = (int(v) for v in pixel)
+    except (TypeError, ValueError):
+        raise SceneError(f"explain: pixel: got {pixel!r}; allowed: (column, row), two whole numbers") from None
+    chosen = _member(integrator, "integrators", "integrator") or scene.integrator or Whitted()
+    return explain_pixel(compile_scene(scene), chosen, column, row, seed)
+
+
+def save(scene: Scene, path: str | Path) -> None:
+    """Write a scene as native YAML; large meshes go into files beside it."""
+    from sightray.formats import save_scene
+
+    _expect(scene, Scene, "save", "scene")
+    save_scene(scene, path)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from sightray._jit import method
+from sightray.accelerators.item import ItemHit
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Space, Table
 from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
-from sightray.scene.items import ItemHit
 
 
 class Accelerator(Member, family="accelerators"):

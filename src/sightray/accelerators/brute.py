@@ -9,10 +9,10 @@ import numpy as np
 
 from sightray._jit import METHOD_SLOTS, implements
 from sightray.accelerators.base import Accelerator, blocked, closest
+from sightray.accelerators.item import ItemHit, intersect_item, item_at, occluded_item
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Space, Table, i64_at, link, table_at
 from sightray.mathlib.vec import Vec3
-from sightray.scene.items import ItemHit, intersect_item, item_at, occluded_item
 
 ITEMS, COUNT = METHOD_SLOTS, METHOD_SLOTS + 1
 

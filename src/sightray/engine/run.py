@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,8 @@ from sightray import _jit
 from sightray.engine.pixels import render_tile
 from sightray.engine.progress import Callback, Progress
 from sightray.film.film import Film
-from sightray.mathlib.table import NULL, Table, aligned
+from sightray.filters.table import filter_table
+from sightray.mathlib.table import NULL, Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
@@ -42,7 +44,7 @@ class Outcome(NamedTuple):
 
 
 def run(
-    compiled: Compiled, integrator: Any, filter_table: np.ndarray, *, samples: int, seed: int,
+    compiled: Compiled, integrator: Any, filter: Any, *, samples: int, seed: int,
     threads: int | None = None, progress: Callback | None = None,
     refine: Callable[[Film], np.ndarray | None] | None = None,
 ) -> Outcome:  # fmt: skip
@@ -60,7 +62,7 @@ def run(
             progress(Progress("compile", done, total, time.perf_counter() - began, 0, name))
 
     compiled.tables.prepare(render_tile, compiling)
-    job = _Job(compiled, integrator, Film(camera.width, camera.height), filter_table, seed, threads, progress)
+    job = _Job(compiled, integrator, Film(camera.width, camera.height), filter, seed, threads, progress)
     try:
         job.sweep(Pass(0, samples, None))
         plan = None if refine is None else refine(job.film)
@@ -84,11 +86,12 @@ def thread_count(threads: int | None) -> int:
 class _Job:
     """State of a run that its threads share."""
 
-    def __init__(self, compiled: Compiled, integrator: Any, film: Film, filter_table: np.ndarray, seed: int,
+    def __init__(self, compiled: Compiled, integrator: Any, film: Film, filter: Any, seed: int,
                  threads: int | None, progress: Callback | None):  # fmt: skip
         self.film, self.seed, self.progress = film, seed, progress
         self.world, self.integrator = compiled.world, compiled.tables.row_of(integrator)
-        self.filter, self.stop = Table(filter_table), Table(aligned(8, np.int64))
+        self.space = Space()
+        self.filter, self.stop = filter_table(filter, self.space), self.space.array(aligned(8, np.int64))
         self.threads = thread_count(threads)
         self.kernel = _jit.native(render_tile)
         self.rays = self.done = self.total = 0
@@ -101,7 +104,7 @@ class _Job:
         queue = self._tiles()
         with ThreadPoolExecutor(self.threads) as pool:
             try:
-                running = {pool.submit(self._tile, this, plan, tile) for tile, _ in zip(queue, range(2 * self.threads))}
+                running = {pool.submit(self._tile, this, plan, tile) for tile in islice(queue, 2 * self.threads)}
                 while running:
                     finished, running = wait(running, POLL, FIRST_COMPLETED)
                     for future in finished:

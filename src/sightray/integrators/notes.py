@@ -15,7 +15,7 @@ from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.vec import Vec3
 
 SIGHT, MIRRORED, REFRACTED, SHADOW = 0, 1, 2, 3  # kinds of rays
-EMISSION, AMBIENT, DIRECT, BACKGROUND, FLAT = 0, 1, 2, 3, 4  # kinds of terms
+EMISSION, AMBIENT, DIRECT, BACKGROUND, FLAT, ABSORPTION = 0, 1, 2, 3, 4, 5  # kinds of terms
 
 
 class RayNote(NamedTuple):

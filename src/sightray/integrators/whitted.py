@@ -9,7 +9,19 @@ from sightray.cameras.base import Ray
 from sightray.fields import flag, integer, number
 from sightray.integrators.base import Integrator, Radiance, radiance
 from sightray.integrators.notes import (
-    AMBIENT, BACKGROUND, DIRECT, EMISSION, FLAT, MIRRORED, REFRACTED, SIGHT, note_hit, note_light, note_ray, note_term,
+    ABSORPTION,
+    AMBIENT,
+    BACKGROUND,
+    DIRECT,
+    EMISSION,
+    FLAT,
+    MIRRORED,
+    REFRACTED,
+    SIGHT,
+    note_hit,
+    note_light,
+    note_ray,
+    note_term,
 )  # fmt: skip
 from sightray.lights.base import cells, illuminate
 from sightray.materials.base import BLINN, Local, local
@@ -90,7 +102,10 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Rad
         terms = local(point.material, point.where, point.cos_view)
         t_min = first_step(integrator, point.p, hit.t)
         note_hit(number, hit.item, hit.t, point.p, point.shading)
-        weight = weight * vexp(terms.absorption * -hit.t)
+        if max3(terms.absorption) > 0.0:
+            left = vexp(terms.absorption * -hit.t)
+            note_term(number, ABSORPTION, left)
+            weight = weight * left
         lit = illuminated(integrator, world, point, terms, d, t_min, number, key)
         color += weight * lit.color
         rays += lit.rays

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sightray import _jit
+from sightray.accelerators import item as item_row
 from sightray.errors import SceneError
 from sightray.lights.base import Light
 from sightray.materials.lambert import Lambert
 from sightray.mathlib.table import Space, Table, aligned, link, set_methods
 from sightray.mathlib.transform import Transform, put_columns
 from sightray.registry import Member
-from sightray.scene import items as item_row
 from sightray.scene import world as world_row
 from sightray.scene.instance import Group, Instance
 from sightray.scene.scene import Scene

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.accelerators.base import blocked, closest
+from sightray.accelerators.item import MATERIAL, ItemHit, item_at, item_surface, to_object
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, table_at
 from sightray.mathlib.vec import Vec3, dot, normalize
-from sightray.scene.items import MATERIAL, ItemHit, item_at, item_surface, to_object
 from sightray.textures.base import Where
 
 TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4

@@ -1,0 +1,80 @@
+"""Items: one shape at one place. The leaves of the scene's tree.
+
+An item row is `ITEM_WORDS` words: where its shape and material stand, and the two matrices between world and object.
+Instances share the shape's row, and so its triangles and its tree.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sightray._jit import kernel
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, advance, i64_at, table_at
+from sightray.mathlib.transform import transform_normal, transform_point, transform_vector
+from sightray.mathlib.vec import Vec3
+from sightray.shapes.base import Surface, intersect, occluded, surface
+from sightray.shapes.hit import Hit
+
+SHAPE, MATERIAL, MOVED, OBJECT = 0, 1, 2, 3  # MOVED: 0 where object space is world space
+OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
+ITEM_WORDS = 40
+
+
+class ItemHit(NamedTuple):
+    """The nearest meeting of a ray and the items of a scene; ``t`` is infinite and `item` -1 where there is none."""
+
+    t: f64
+    item: i64
+    prim: i64
+    u: f64
+    v: f64
+
+
+@kernel
+def item_at(items: Table, index: i64) -> Table:
+    """Row of item number `index`."""
+    return advance(items, index * ITEM_WORDS)
+
+
+@kernel
+def intersect_item(item: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Hit:
+    """Send the inverse-transformed ray to the item's shape; t means the same in both spaces."""
+    shape = table_at(item, SHAPE)
+    if i64_at(item, MOVED) == 0:
+        return intersect(shape, o, d, t_min, t_max)
+    o_object = transform_point(item, OBJECT_FROM_WORLD, o)
+    d_object = transform_vector(item, OBJECT_FROM_WORLD, d)
+    return intersect(shape, o_object, d_object, t_min, t_max)
+
+
+@kernel
+def occluded_item(item: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
+    """Whether the item stands in the way."""
+    shape = table_at(item, SHAPE)
+    if i64_at(item, MOVED) == 0:
+        return occluded(shape, o, d, t_min, t_max)
+    o_object = transform_point(item, OBJECT_FROM_WORLD, o)
+    d_object = transform_vector(item, OBJECT_FROM_WORLD, d)
+    return occluded(shape, o_object, d_object, t_min, t_max)
+
+
+@kernel
+def item_surface(item: Table, hit: ItemHit, p_object: Vec3) -> Surface:
+    """The surface at a hit in world space: normals by the inverse transpose, tangents by the matrix."""
+    s = surface(table_at(item, SHAPE), Hit(hit.t, hit.prim, hit.u, hit.v), p_object)
+    if i64_at(item, MOVED) == 0:
+        return s
+    return Surface(
+        transform_normal(item, OBJECT_FROM_WORLD, s.normal),
+        transform_normal(item, OBJECT_FROM_WORLD, s.shading),
+        s.u, s.v, transform_vector(item, WORLD_FROM_OBJECT, s.tangent),
+    )  # fmt: skip
+
+
+@kernel
+def to_object(item: Table, p: Vec3) -> Vec3:
+    """A world point in the item's object space."""
+    if i64_at(item, MOVED) == 0:
+        return p
+    return transform_point(item, OBJECT_FROM_WORLD, p)

@@ -51,7 +51,7 @@ def build() -> sr.Scene:
     walls = [faces([quad], color, name) for name, (color, quad) in WALLS.items()]
     blocks = [faces(quads, WHITE, name) for name, quads in BLOCKS.items()]
     lamp = sr.RectangleLight(
-        corner=(0.213, 0.5487, 0.227), edge_u=(0.13, 0, 0), edge_v=(0, 0, 0.105), radiance=LIGHT, grid=4
+        corner=(0.213, 0.5487, 0.227), edge_u=(0.13, 0, 0), edge_v=(0, 0, 0.105), radiance=LIGHT, grid=2
     )
     return sr.Scene(
         *walls, *blocks, lamp,

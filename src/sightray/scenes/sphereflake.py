@@ -24,7 +24,7 @@ def flake(level: int, material: object) -> sr.Group:
 
 def build() -> sr.Scene:
     shiny = sr.Phong(diffuse=(0.55, 0.42, 0.2), specular=0.5, shininess=50, mirror=0.45, ambient=(0.5, 0.4, 0.2))
-    floor = sr.Phong(diffuse=0.55, ambient=0.5, mirror=0.1)
+    floor = sr.Phong(diffuse=0.55, ambient=0.5, mirror=0.1, specular=0)
     return sr.Scene(
         sr.Group(objects=[flake(LEVELS, shiny)], transform=sr.Transform.rotate((1, 0, 0), 12), name="sphereflake"),
         sr.Plane(point=(0, -1.75, 0), normal=(0, 1, 0), material=floor, name="floor"),
@@ -33,5 +33,5 @@ def build() -> sr.Scene:
         camera=sr.PerspectiveCamera(
             eye=(2.1, 2.6, 4.7), target=(0, -0.1, 0), vfov=40, width=640, height=480
         ),
-        background=(0.1, 0.14, 0.22), ambient=0.25, samples=4, name="sphereflake",
+        background=(0.1, 0.14, 0.22), ambient=0.25, samples=9, name="sphereflake",
     )  # fmt: skip

@@ -40,7 +40,7 @@ def build() -> sr.Scene:
     glaze = sr.Phong(diffuse=(0.75, 0.28, 0.12), specular=0.35, shininess=60, ambient=(0.75, 0.28, 0.12), mirror=0.08)
     table = sr.Phong(
         diffuse=sr.Checker(even=(0.85, 0.82, 0.75), odd=(0.25, 0.3, 0.36), scale=1.0, mode="solid"),
-        ambient=(0.5, 0.5, 0.5), mirror=0.12,
+        ambient=0.5, mirror=0.12, specular=0,
     )  # fmt: skip
     return sr.Scene(
         teapot_mesh(material=glaze, name="teapot"),
@@ -48,5 +48,5 @@ def build() -> sr.Scene:
         sr.RectangleLight(corner=(-5, 8, 4), edge_u=(3, 0, 0), edge_v=(0, 2, -2), radiance=9, grid=4, visible=False),
         sr.PointLight(position=(7, 5, 6), intensity=18),
         camera=sr.PerspectiveCamera(eye=(2.6, 4.2, 8.4), target=(0.15, 1.35, 0), vfov=38, width=640, height=480),
-        background=(0.62, 0.72, 0.85), ambient=0.18, samples=4, name="teapot",
+        background=(0.62, 0.72, 0.85), ambient=0.18, samples=9, name="teapot",
     )  # fmt: skip

@@ -1,0 +1,5 @@
+"""``python -m sightray``."""
+
+from sightray.cli import main
+
+main()

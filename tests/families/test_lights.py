@@ -1,0 +1,234 @@
+"""Lights: what every one promises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sightray._jit import kernel, native
+from sightray.errors import SceneError
+from sightray.lights.area import _AreaLight
+from sightray.lights.base import cells, illuminate
+from sightray.lights.directional import DirectionalLight
+from sightray.lights.disk import DiskLight, concentric
+from sightray.lights.point import PointLight
+from sightray.lights.rectangle import RectangleLight
+from sightray.lights.sphere import SphereLight
+from sightray.lights.spot import SpotLight
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Table, f64_at, f64_put, vec3_at, vec3_put
+from sightray.registry import members
+from sightray.scene.compile import Tables
+from sightray.shapes.base import intersect
+
+SLANTED = {"corner": (-1, 3, 0.5), "edge_u": (2, 0.3, 0), "edge_v": (0.5, 0.2, 2)}
+EXAMPLES = {
+    "PointLight": [PointLight(position=(1, 2, 3)), PointLight(position=(0, 0, 9), attenuation=(1, 0.5, 0.1))],
+    "DirectionalLight": [DirectionalLight(direction=(1, -2, 0.5), irradiance=(1, 2, 3)), DirectionalLight()],
+    "SpotLight": [
+        SpotLight(position=(0, 3, 0), target=(0, 0, 0), angle=90, blend=0.5),
+        SpotLight(position=(1, 1, 1), target=(-1, 0, 0), angle=180, blend=0, intensity=(3, 2, 1)),
+    ],
+    "RectangleLight": [RectangleLight(**SLANTED, grid=3), RectangleLight(**SLANTED, radiance=2, two_sided=True)],
+    "DiskLight": [
+        DiskLight(center=(0, 2, 0), radius=0.7),
+        DiskLight(center=(1, 2, 3), normal=(-1, -3, 2), two_sided=True, grid=5, radiance=(3, 0, 1)),
+    ],
+    "SphereLight": [SphereLight(center=(0, 2, 0)), SphereLight(center=(3, -1, 2), radius=1.7, grid=7)],
+}
+EVERY = [pytest.param(x, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() for i, x in enumerate(all_of)]
+AREA = [p for p in EVERY if isinstance(p.values[0], _AreaLight)]
+
+
+@kernel
+def ask(light: Table, count: i64, points: Table, samples: Table) -> i64:
+    """`illuminate` for many points, each p, u, v in 6 words of 8; the cell is the point's number, round and round."""
+    total = cells(light)
+    for i in range(count):
+        x = illuminate(light, vec3_at(points, 8 * i), i % total, f64_at(points, 8 * i + 4), f64_at(points, 8 * i + 5))
+        vec3_put(samples, 8 * i, x.direction)
+        vec3_put(samples, 8 * i + 4, x.irradiance)
+        f64_put(samples, 8 * i + 3, x.distance)
+    return total
+
+
+@kernel
+def meet(shape: Table, count: i64, samples: Table, points: Table, distances: Table) -> i64:
+    """Where the rays towards the samples meet a shape."""
+    for i in range(count):
+        hit = intersect(shape, vec3_at(points, 8 * i), vec3_at(samples, 8 * i), 0.0, math.inf)
+        f64_put(distances, i, hit.t)
+    return count
+
+
+def samples_of(light, points: np.ndarray, compiled: bool = True) -> tuple[int, np.ndarray]:
+    """Number of cells, and (n, 8): direction, distance, irradiance, of points (n, 8): p, 0, u, v."""
+    tables = Tables()
+    row = tables.row_of(light)
+    tables.prepare(ask, compiled=compiled)
+    out = np.zeros((len(points), 8))
+    total = (native(ask) if compiled else ask)(row, len(points), Table(points), Table(out))
+    return total, out
+
+
+def random_points(count: int = 200, seed: int = 0, spread: float = 6.0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    points = np.zeros((count, 8))
+    points[:, :3] = rng.uniform(-spread, spread, (count, 3))
+    points[:, 4:6] = rng.uniform(0, 1, (count, 2))
+    return points
+
+
+def at(*places) -> np.ndarray:
+    points = np.zeros((len(places), 8))
+    points[:, :3] = places
+    points[:, 4:6] = 0.5
+    return points
+
+
+def test_no_light_lacks_an_example():
+    assert set(EXAMPLES) == {n for n, cls in members("lights").items() if cls.__module__.startswith("sightray.")}
+
+
+@pytest.mark.parametrize("light", EVERY)
+def test_machine_code_answers_as_python_does(light):
+    points = random_points()
+    total, expected = samples_of(light, points, compiled=False)
+    found_total, found = samples_of(light, points)
+    assert total == found_total == getattr(light, "grid", 1) ** 2
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("light", EVERY)
+def test_directions_are_unit_and_light_is_finite_and_not_negative(light):
+    _, samples = samples_of(light, random_points())
+    np.testing.assert_allclose(np.linalg.norm(samples[:, :3], axis=1), 1, rtol=1e-14)
+    assert (samples[:, 3] > 0).all()
+    assert (samples[:, 4:7] >= 0).all()
+    assert np.isfinite(samples[:, 4:7]).all()
+    assert samples[:, 4:7].any()
+
+
+@pytest.mark.parametrize("light", EVERY)
+def test_light_is_proportional_to_its_colour(light):
+    (name,) = {"intensity", "irradiance", "radiance"} & set(light.fields)
+    points = random_points()
+    white = samples_of(light.replace(**{name: 1}), points)[1][:, 4:7]
+    coloured = samples_of(light.replace(**{name: (0, 0.5, 40)}), points)[1][:, 4:7]
+    np.testing.assert_allclose(coloured, white * (0, 0.5, 40), rtol=1e-14)
+
+
+@pytest.mark.parametrize("light", EVERY)
+def test_plain_values_make_the_same_light(light):
+    plain = {name: light.fields[name].plain(value) for name, value in light.values().items()}
+    assert type(light)(**plain).values() == light.values()
+    assert repr(light.replace()) == repr(light)
+
+
+# --- lights with an area -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("light", AREA)
+def test_samples_lie_on_the_shape_that_is_seen(light):
+    points = random_points()
+    _, samples = samples_of(light, points)
+    tables = Tables()
+    row = tables.row_of(light.shape())
+    tables.prepare(meet)
+    distances = np.zeros(len(points))
+    native(meet)(row, len(points), Table(samples), Table(points), Table(distances))
+    lit = samples[:, 4:7].any(axis=1)
+    assert lit.sum() > 20
+    np.testing.assert_allclose(distances[lit], samples[lit, 3], rtol=1e-6)
+
+
+@pytest.mark.parametrize("light", AREA)
+def test_the_shape_glows_with_the_lights_radiance(light):
+    assert light.shape().material.radiance == light.radiance
+    assert light.shape().material.two_sided == getattr(light, "two_sided", False)
+    assert light.replace(visible=False).shape() is None
+
+
+@pytest.mark.parametrize("light", [p for p in EVERY if p not in AREA])
+def test_lights_without_an_area_are_not_seen(light):
+    assert light.shape() is None
+
+
+def test_a_one_sided_light_is_dark_behind_and_the_shape_shines_to_the_lit_side():
+    below, above = (0.2, 0, 0.1), (0.2, 4, 0.1)
+    down = {"corner": (-1, 2, -1), "edge_u": (2, 0, 0), "edge_v": (0, 0, 2)}  # x cross z is down
+    for light in (RectangleLight(**down), DiskLight(center=(0, 2, 0), normal=(0, -5, 0))):
+        _, (lit, dark) = samples_of(light, at(below, above))
+        assert lit[4] > 0
+        assert not dark[4:7].any()
+        assert 0 < dark[3] < 10
+        _, (a, b) = samples_of(light.replace(two_sided=True), at(below, above))
+        assert a[4] > 0
+        assert b[4] > 0
+        assert np.dot(light.shape().values().get("normal", (0, -1, 0)), (0, -1, 0)) > 0
+
+
+@pytest.mark.parametrize(("light", "places"), [
+    (RectangleLight(corner=(0, 0, 0), edge_u=(1, 0, 0), edge_v=(0, 1, 0), grid=1), [(0.5, 0.5, 0), (9, 9, 0)]),
+    (DiskLight(center=(0, 0, 0), normal=(0, 0, 1), grid=1), [(0, 0, 0), (0.5, 0.5, 0), (3, 0, 0)]),
+    (SphereLight(center=(1, 0, 0), radius=1, grid=1), [(1, 0, 0), (0, 0, 0), (1.5, 0, 0)]),
+    (SpotLight(position=(0, 0, 0), target=(1, 0, 0)), [(0, 0, 0)]),
+])  # fmt: skip
+def test_points_on_and_in_a_light_get_nothing_from_it(light, places):
+    _, samples = samples_of(light, at(*places))
+    assert not samples[:, 4:7].any()
+    assert np.isfinite(samples).all()
+    np.testing.assert_allclose(np.linalg.norm(samples[:, :3], axis=1), 1, rtol=1e-14)
+
+
+@kernel
+def fold(count: i64, points: Table) -> i64:
+    """Send points of the unit square through the concentric map, in place."""
+    for i in range(count):
+        vec3_put(points, 4 * i, concentric(f64_at(points, 4 * i), f64_at(points, 4 * i + 1)))
+    return count
+
+
+def test_shirley_chiu_concentric_map_keeps_areas():
+    """Even points of the square are even in r² and phi, by a chi-square test over 10 x 24 pieces of equal area."""
+    points = np.random.default_rng(0).uniform(0, 1, (100_000, 4))
+    native(fold)(len(points), Table(points))
+    x, y = points[:, 0], points[:, 1]
+    pieces = np.histogram2d(x * x + y * y, np.arctan2(y, x), (10, 24), ((0, 1), (-math.pi, math.pi)))[0]
+    assert pieces.sum() == len(points)
+    assert stats.chisquare(pieces.ravel()).pvalue > 1e-3
+    centre = np.array([[0.5, 0.5, 1, 1]])
+    native(fold)(1, Table(centre))
+    assert centre[0, :2].tolist() == [0, 0]
+
+
+def test_cells_share_the_square_without_overlap():
+    light = RectangleLight(corner=(0, 0, 0), edge_u=(4, 0, 0), edge_v=(0, 4, 0), grid=4)
+    points = random_points(1600)
+    points[:, :3] = 1, 2, 3
+    total, samples = samples_of(light, points)
+    q = points[:, :3] + samples[:, :3] * samples[:, 3:4]
+    cell = np.floor(q[:, 0]).astype(int) + 4 * np.floor(q[:, 1]).astype(int)
+    np.testing.assert_array_equal(cell, np.arange(1600) % total)
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: DirectionalLight(direction=(0, 0, 0)), r"DirectionalLight\.direction: .*not all zero"),
+    (lambda: DirectionalLight(irradiance=-1), r"DirectionalLight\.irradiance"),
+    (lambda: SpotLight(position=(1, 2, 3), target=(1, 2, 3)), r"SpotLight: position and target are the same point"),
+    (lambda: SpotLight(position=(1, 2, 3), target=(0, 0, 0), angle=181), r"SpotLight\.angle: got 181; .*<= 180"),
+    (lambda: SpotLight(position=(1, 2, 3), target=(0, 0, 0), blend=2), r"SpotLight\.blend: got 2"),
+    (lambda: SpotLight(position=(1, 2, 3), target=(0, 0, 0), attenuation=(0, 0, 0)), r"attenuation: .*not all zero"),
+    (lambda: RectangleLight(corner=(0, 0, 0), edge_u=(1, 2, 3), edge_v=(2, 4, 6)), r"RectangleLight: .* parallel"),
+    (lambda: RectangleLight(corner=(0, 0, 0), edge_u=(1, 2, 3)), r"RectangleLight\.edge_v: missing"),
+    (lambda: DiskLight(center=(0, 0, 0), radius=0), r"DiskLight\.radius: got 0; .*> 0"),
+    (lambda: DiskLight(center=(0, 0, 0), grid=0), r"DiskLight\.grid: got 0; .*>= 1"),
+    (lambda: SphereLight(center=(0, 0, 0), grid=2.5), r"SphereLight\.grid: got 2\.5; allowed: a whole number"),
+    (lambda: SphereLight(centre=(0, 0, 0)), r"SphereLight: unknown field 'centre'; did you mean 'center'\?"),
+])  # fmt: skip
+def test_errors_say_where_what_and_what_is_allowed(make, message):
+    with pytest.raises(SceneError, match=message):
+        make()

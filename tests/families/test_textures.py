@@ -1,0 +1,213 @@
+"""Textures: what every one promises, and what each one says."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sightray._jit import kernel, native
+from sightray.errors import FormatError, SceneError
+from sightray.images import Image
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Table, f64_at, vec3_at, vec3_put
+from sightray.registry import members
+from sightray.scene.compile import Tables
+from sightray.textures.base import Where, texture_value
+from sightray.textures.bitmap import Bitmap
+from sightray.textures.checker import Checker
+from sightray.textures.constant import Constant
+
+COLOURS = np.random.default_rng(5).uniform(0, 2, (3, 4, 3)).astype(np.float32)  # 4 wide, 3 high
+MODES = [(f, w) for f in ("nearest", "bilinear") for w in ("repeat", "clamp", "mirror")]
+EXAMPLES = {
+    "Constant": [Constant(color=(1, 2, 3))],
+    "Checker": [
+        Checker(),
+        Checker(even=(1, 2, 3), odd=Checker(scale=10, even=5), scale=3.3),
+        Checker(mode="solid", scale=0.7, even=Bitmap(image=COLOURS)),
+    ],
+    "Bitmap": [Bitmap(image=COLOURS, filter=f, wrap=w, scale=(2, -1.5), offset=(0.1, 7)) for f, w in MODES],
+}
+EVERY = [pytest.param(t, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() for i, t in enumerate(all_of)]
+
+
+@kernel
+def ask(texture: Table, count: i64, places: Table, colours: Table) -> i64:
+    """`texture_value` at many places, each u, v, p (8 words)."""
+    for i in range(count):
+        where = Where(f64_at(places, 8 * i), f64_at(places, 8 * i + 1), vec3_at(places, 8 * i + 2))
+        vec3_put(colours, 4 * i, texture_value(texture, where))
+    return count
+
+
+def colours_of(texture, places, compiled: bool = True) -> np.ndarray:
+    """(n, 2 or 5) places u, v, x, y, z -> (n, 3) colours."""
+    rows = np.zeros((len(places), 8))
+    rows[:, : np.shape(places)[1]] = places
+    tables = Tables()
+    row = tables.row_of(texture)
+    tables.prepare(ask, compiled=compiled)
+    out = np.zeros((len(rows), 4))
+    (native(ask) if compiled else ask)(row, len(rows), Table(rows), Table(out))
+    return out[:, :3]
+
+
+def test_no_texture_lacks_an_example():
+    assert set(EXAMPLES) == {n for n, cls in members("textures").items() if cls.__module__.startswith("sightray.")}
+
+
+@pytest.mark.parametrize("texture", EVERY)
+def test_machine_code_answers_as_python_does(texture):
+    places = np.random.default_rng(0).uniform(-5, 5, (100, 5))
+    expected = colours_of(texture, places, compiled=False)
+    assert np.isfinite(expected).all()
+    np.testing.assert_allclose(colours_of(texture, places), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("texture", EVERY)
+@pytest.mark.parametrize("value", [1e300, -1e300, math.inf, math.nan])
+def test_absurd_places_stay_within_the_texture(texture, value):
+    colours_of(texture, np.full((1, 5), value))  # bilinear weights may be NaN there; memory must not be left
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e19, math.inf, -math.inf, math.nan])
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+def test_the_nearest_texel_exists_for_any_number(wrap, value):
+    found = colours_of(Bitmap(image=COLOURS, filter="nearest", wrap=wrap), [(value, value)])[0]
+    assert found.astype(np.float32).tolist() in COLOURS.reshape(-1, 3).tolist()
+
+
+# --- Checker -------------------------------------------------------------------------------------------------------
+
+
+def test_checker_alternates_along_u_and_v():
+    places = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75), (-0.25, 0.25), (-0.25, -0.25)]
+    found = colours_of(Checker(even=1, odd=0, scale=2), places)[:, 0]
+    assert found.tolist() == [1, 0, 0, 1, 0, 1]
+
+
+def test_solid_checker_counts_three_axes_and_ignores_uv():
+    cells = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)])
+    places = np.column_stack([np.random.default_rng(1).uniform(-9, 9, (len(cells), 2)), cells + 0.5])
+    found = colours_of(Checker(even=1, odd=0, mode="solid"), places)[:, 0]
+    np.testing.assert_array_equal(found, (cells.sum(axis=1) + 1) % 2)
+
+
+def test_a_solid_floor_does_not_flicker_between_cells():
+    floor = np.zeros((50, 5))
+    floor[:, 2], floor[:, 4] = 0.5, 0.5
+    floor[:, 3] = np.random.default_rng(2).uniform(-1e-9, 1e-9, 50)
+    assert (colours_of(Checker(even=1, odd=0, mode="solid"), floor) == 1).all()
+
+
+def test_checkers_nest():
+    outer = Checker(even=0, odd=Checker(even=1, odd=2, scale=4))
+    assert colours_of(outer, [(0.1, 0.1), (1.1, 0.1), (1.3, 0.1)])[:, 0].tolist() == [0, 1, 2]
+
+
+# --- Bitmap --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("filter", ["nearest", "bilinear"])
+def test_texel_centres_are_exact_with_v_upwards(filter):
+    places = [((x + 0.5) / 4, 1 - (y + 0.5) / 3) for y in range(3) for x in range(4)]
+    found = colours_of(Bitmap(image=COLOURS, filter=filter), places)
+    np.testing.assert_allclose(found, COLOURS.reshape(-1, 3), rtol=1e-14 if filter == "nearest" else 1e-12)
+
+
+def test_the_top_row_is_at_v_1_and_the_left_column_at_u_0():
+    picture = np.array([[1, 2], [3, 4]], dtype=float)  # grey, 1 2 on top
+    corners = [(0.01, 0.99), (0.99, 0.99), (0.01, 0.01), (0.99, 0.01)]
+    for filter in ("nearest", "bilinear"):
+        found = colours_of(Bitmap(image=picture, filter=filter, wrap="clamp"), corners)
+        assert found.tolist() == [[1] * 3, [2] * 3, [3] * 3, [4] * 3]
+
+
+def test_bilinear_blends_by_distance():
+    picture = np.array([[1, 2], [3, 4]], dtype=float)
+    found = colours_of(Bitmap(image=picture), [(0.5, 0.5), (0.5, 0.75), (0.375, 0.75), (0.25, 0.5)])[:, 0]
+    np.testing.assert_allclose(found, [2.5, 1.5, 1.25, 2.0], rtol=1e-14)
+
+
+def test_bilinear_is_continuous_across_the_seam_of_a_repeated_picture():
+    edge = [(1 - 1e-9, 0.3), (1 + 1e-9, 0.3), (0.3, 2 - 1e-9), (0.3, 2 + 1e-9)]
+    a, b, c, d = colours_of(Bitmap(image=COLOURS), edge)
+    np.testing.assert_allclose(a, b, atol=1e-6)
+    np.testing.assert_allclose(c, d, atol=1e-6)
+
+
+@pytest.mark.parametrize(("wrap", "columns"), [
+    ("repeat", [2, 3, 0, 1, 2, 3, 0, 1]), ("clamp", [0, 0, 0, 1, 2, 3, 3, 3]), ("mirror", [1, 0, 0, 1, 2, 3, 3, 2]),
+])  # fmt: skip
+def test_what_lies_beyond_the_edges(wrap, columns):
+    places = [((i + 0.5) / 4, 0.5) for i in range(-2, 6)]
+    found = colours_of(Bitmap(image=COLOURS, filter="nearest", wrap=wrap), places)
+    np.testing.assert_array_equal(found.astype(np.float32), COLOURS[1, columns])
+
+
+def test_scale_and_offset_move_the_place_that_is_looked_up():
+    places = np.random.default_rng(3).uniform(-1, 2, (50, 2))
+    moved = colours_of(Bitmap(image=COLOURS, scale=(2, -3), offset=(0.25, 0.5)), places)
+    np.testing.assert_allclose(moved, colours_of(Bitmap(image=COLOURS), places * (2, -3) + (0.25, 0.5)), atol=1e-12)
+    assert Bitmap(image=COLOURS, scale=3).scale == (3.0, 3.0)
+
+
+def test_one_channel_is_grey_and_alpha_is_ignored():
+    grey, with_alpha = COLOURS[..., :1], np.dstack([COLOURS, np.zeros((3, 4), np.float32)])
+    assert (Bitmap(image=grey).pixels == np.repeat(grey, 3, axis=2)).all()
+    assert (Bitmap(image=with_alpha).pixels == COLOURS).all()
+    assert (Bitmap(image=Image(COLOURS)).pixels == COLOURS).all()
+
+
+def test_a_file_is_decoded_to_linear_colours_unless_it_holds_numbers(tmp_path):
+    path = tmp_path / "half.png"
+    Image(np.full((2, 2, 3), 0.5, np.float32)).save(path)  # sRGB: 188
+    assert abs(colours_of(Bitmap(image=path), [(0.5, 0.5)])[0, 0] - 0.5) < 0.003
+    assert abs(colours_of(Bitmap(image=str(path), linear=True), [(0.5, 0.5)])[0, 0] - 188 / 255) < 1e-6
+
+
+def test_a_later_change_of_the_array_does_not_reach_the_texture():
+    picture = np.ones((2, 2, 3))
+    texture = Bitmap(image=picture)
+    picture[:] = 0
+    assert (texture.pixels == 1).all()
+    assert not texture.pixels.flags.writeable
+
+
+@pytest.mark.parametrize("image", [COLOURS, "file"])
+def test_plain_values_make_the_same_texture(image, tmp_path):
+    if isinstance(image, str):
+        image = tmp_path / "a.exr"
+        Image(COLOURS).save(image)
+    texture = Bitmap(image=image, wrap="mirror", scale=(1, 2))
+    plain = {name: texture.fields[name].plain(value) for name, value in texture.values().items()}
+    assert (Bitmap(**plain).pixels == texture.pixels).all()
+    assert Bitmap(**plain).scale == (1.0, 2.0)
+
+
+def test_a_broken_file_is_a_format_error_that_names_it(tmp_path):
+    (tmp_path / "broken.png").write_bytes(b"not a picture")
+    with pytest.raises(FormatError, match=r"broken\.png"):
+        Bitmap(image=tmp_path / "broken.png")
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: Bitmap(image="no/such.png"), r"such\.png: no such file"),
+    (lambda: Bitmap(image=Path("no/such.png")), r"such\.png: no such file"),
+    (lambda: Bitmap(), r"Bitmap\.image: missing"),
+    (lambda: Bitmap(image=np.zeros((2, 2, 2))), r"Bitmap\.image: .*shape \(2, 2, 2\).*1, 3 or 4 channels"),
+    (lambda: Bitmap(image=np.zeros((2, 2, 3), np.uint8)), r"Bitmap\.image: .*uint8.*Divide uint8 values by 255"),
+    (lambda: Bitmap(image=[[1.0], [1.0, 2.0]]), r"Bitmap\.image: .*path of a picture"),
+    (lambda: Bitmap(image=np.full((2, 2), np.nan)), r"Bitmap\.image: the array holds infinite or undefined numbers"),
+    (lambda: Bitmap(image=COLOURS, wrap="mirrored"), r"Bitmap\.wrap: unknown choice 'mirrored'; did you mean 'mirror'"),
+    (lambda: Bitmap(image=COLOURS, scale=(1, 2, 3)), r"Bitmap\.scale: got \(1, 2, 3\); allowed: two finite numbers"),
+    (lambda: Checker(scale=0), r"Checker\.scale: got 0; allowed: a finite number > 0"),
+    (lambda: Checker(mode="xyz"), r"Checker\.mode: unknown choice 'xyz'.*solid, uv"),
+    (lambda: Checker(even="red"), r"Checker\.even: got 'red'; allowed: a linear colour"),
+])  # fmt: skip
+def test_errors_say_where_what_and_what_is_allowed(make, message):
+    with pytest.raises(SceneError, match=message):
+        make()

@@ -57,11 +57,11 @@ def enabled() -> bool:
     return os.environ.get("SIGHTRAY_JIT", "1") != "0"
 
 
-# ---------------------------------------------------------------------------------------------- what kernels are made of
+# ------------------------------------------------------------------------------------------ what kernels are made of
 
 
 def kernel(function: F | None = None, *, exact: bool = False) -> Any:
-    """Mark `function` as a kernel. With ``exact``, products and sums are not fused: ``a*b - c*d`` stays antisymmetric."""
+    """Mark a kernel. With ``exact``, products and sums are not fused: ``a*b - c*d`` stays antisymmetric."""
     if function is None:
         return functools.partial(kernel, exact=exact)
     function.__kernel__ = {"exact": exact}  # type: ignore[attr-defined]
@@ -148,7 +148,7 @@ def _names(code: types.CodeType) -> set[str]:
     return names
 
 
-# --------------------------------------------------------------------------------------------------- compiling with Numba
+# ----------------------------------------------------------------------------------------------- compiling with Numba
 
 
 def numba_type(annotation: Any) -> Any:
@@ -168,7 +168,7 @@ def numba_type(annotation: Any) -> Any:
         return nt.NamedTuple(members, annotation)
     if typing.get_origin(annotation) is tuple:
         return nt.Tuple([numba_type(part) for part in typing.get_args(annotation)])
-    return getattr(_lowering(annotation.__module__), "TYPES")[annotation]
+    return _lowering(annotation.__module__).TYPES[annotation]
 
 
 def signature(function: Callable) -> Any:
@@ -282,7 +282,7 @@ def _compile(function: Callable) -> ObjectCode:
         return ObjectCode(result.fndesc.mangled_name, tuple(needs), _machine().emit_object(module))
 
 
-# -------------------------------------------------------------------------------------------------------------- the cache
+# ---------------------------------------------------------------------------------------------------------- the cache
 
 
 def cache_folder() -> Path | None:
@@ -329,7 +329,11 @@ def _key(function: Callable) -> str:
 
 def _cache_path(function: Callable) -> Path | None:
     folder = cache_folder()
-    return None if folder is None else folder / f"{function.__qualname__.replace('<', '').replace('>', '')}-{_key(function)}.o"
+    return (
+        None
+        if folder is None
+        else folder / f"{function.__qualname__.replace('<', '').replace('>', '')}-{_key(function)}.o"
+    )
 
 
 def _read(path: Path | None) -> ObjectCode | None:
@@ -360,7 +364,7 @@ def _write(path: Path | None, unit: ObjectCode) -> None:
         return
 
 
-# ------------------------------------------------------------------------------------------------------ loading and calling
+# ------------------------------------------------------------------------------------------------ loading and calling
 
 
 _engines: list[Any] = []  # machine code lives as long as its engine
@@ -382,14 +386,28 @@ def _load(unit: ObjectCode) -> int | None:
     """Link object code into the process: the address of its function, or None if a symbol is missing."""
     import llvmlite.binding as llvm
 
-    machine = _machine()
-    if any(llvm.address_of_symbol(name) is None for name in unit.needs):
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())  # from now on, LLVM sees our own symbols
+    if not all(_find_symbol(name) for name in unit.needs):
         return None
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(unit.code))
     engine.finalize_object()
     _engines.append(engine)
     return engine.get_function_address(unit.symbol)
+
+
+def _find_symbol(name: str) -> bool:
+    """Whether the linker will find an external symbol; functions of the C library are looked up where it does not."""
+    import llvmlite.binding as llvm
+
+    if llvm.address_of_symbol(name) is not None:
+        return True
+    library = {"linux": "libm.so.6", "win32": "ucrtbase.dll", "darwin": None}.get(sys.platform)
+    try:
+        found = ctypes.cast(getattr(ctypes.CDLL(library), name), ctypes.c_void_p).value
+    except (OSError, AttributeError):
+        return False
+    llvm.add_symbol(name, found)
+    return True
 
 
 @functools.cache
@@ -402,8 +420,6 @@ def address(function: Callable) -> int:
         if found is None:
             unit = _compile(function)
             _write(path, unit)
-            import numba.core.registry  # registers the symbols that Numba's own helpers need
-
             found = _load(unit)
         if found is None:
             raise RuntimeError(f"cannot link {function.__qualname__}: a symbol is missing of {unit.needs}")

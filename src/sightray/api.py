@@ -39,7 +39,7 @@ def render(
     samples : rays of sight per pixel; by default the scene's. A single one goes through the pixel's centre.
     seed : names the random numbers: the same seed gives the same picture, whatever the number of threads.
     threads : by default one for every core.
-    filter : reconstruction filter for more than one sample; by default `Gaussian`.
+    filter : reconstruction filter for more than one sample; by default `BoxFilter`.
     adaptive : contrast between neighbours (0 to 1) above which pixels get additional samples; None for none.
     max_samples : samples of those pixels; by default 4 times `samples`, and at least 9.
     accelerator : structure that finds hits; by default `Bvh`.
@@ -59,7 +59,7 @@ def render(
     """
     from sightray.engine.adaptive import where_neighbours_differ
     from sightray.engine.run import run
-    from sightray.filters.gaussian import Gaussian
+    from sightray.filters.box import BoxFilter
     from sightray.integrators.whitted import Whitted
     from sightray.scene.compile import compile_scene, require_camera
 
@@ -77,7 +77,7 @@ def render(
     require_camera(scene)
     outcome = run(
         compile_scene(scene, _member(accelerator, "accelerators", "accelerator")), integrator,
-        _member(filter, "filters", "filter") or Gaussian(),
+        _member(filter, "filters", "filter") or BoxFilter(),
         samples=samples, seed=seed, threads=threads, progress=progress, refine=refine,
     )  # fmt: skip
     if not outcome.complete and not partial_ok:

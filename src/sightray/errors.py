@@ -52,4 +52,5 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
 def unknown(what: str, name: str, valid: Iterable[str]) -> str:
     """One sentence for an unknown name: what it is, the nearest valid one, and all of them."""
     names = sorted(valid)
-    return f"unknown {what} '{name}'{did_you_mean(name, names)} Allowed: {', '.join(names)}".replace("' Allowed", "'. Allowed")
+    hint = did_you_mean(name, names) or "."
+    return f"unknown {what} '{name}'{hint} Allowed: {', '.join(names)}"

@@ -203,9 +203,8 @@ class ColorField(Vector):
         self.at_most = at_most
 
     def convert(self, value: Any) -> Color:
-        if _is_scalar(value) and not isinstance(value, str | bool):
-            value = (value,) * 3
-        numbers = _finite(value, (3,))
+        grey = _is_scalar(value) and not isinstance(value, str | bool)
+        numbers = _finite((value,) * 3 if grey else value, (3,))
         if numbers is None or (numbers < 0).any() or (numbers > self.at_most).any():
             raise self.wrong(value)
         r, g, b = numbers.tolist()
@@ -239,8 +238,11 @@ class Array(Field):
         if array.size == 0 and self.columns is not None:
             array = array.reshape(0, self.columns)
         shaped = array.ndim == (1 if self.columns is None else 2) and self.columns in (None, array.shape[-1])
-        if not shaped or raw.dtype.kind not in "iuf" or not np.isfinite(array).all() or (array != raw).any() and (
-            self.dtype.kind in "iu"
+        if (
+            not shaped
+            or raw.dtype.kind not in "iuf"
+            or not np.isfinite(array).all()
+            or ((array != raw).any() and (self.dtype.kind in "iu"))
         ):
             raise self.wrong(value)
         array.flags.writeable = False

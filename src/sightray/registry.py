@@ -14,7 +14,7 @@ import typing
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from sightray import fields as _fields
+import sightray.fields as _fields
 from sightray._jit import METHOD_SLOTS
 from sightray.errors import SceneError, unknown
 from sightray.fields import REQUIRED, Derived, Field
@@ -27,8 +27,7 @@ else:
         return lambda cls: cls
 
 
-FAMILIES = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters", "scene",
-            "accelerators")
+FAMILIES = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters", "scene", "accelerators")
 _members: dict[str, dict[str, type[Member]]] = {name: {} for name in FAMILIES}
 
 
@@ -40,13 +39,15 @@ class Member:
 
     family: ClassVar[str] = ""
     fields: ClassVar[dict[str, Field]] = {}
+    given: ClassVar[dict[str, Field]] = {}  # without the derived ones
     kernels: ClassVar[dict[Callable, Callable]] = {}
 
     def __init_subclass__(cls, family: str | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Field)}
         cls.fields = {**cls.fields, **own}
-        cls.__signature__ = _signature(cls.fields)  # type: ignore[attr-defined]
+        cls.given = {name: field for name, field in cls.fields.items() if not isinstance(field, Derived)}
+        cls.__signature__ = _signature(cls.given)  # type: ignore[attr-defined]
         if family is not None:
             cls.family = family
         elif not cls.__name__.startswith("_"):
@@ -54,12 +55,11 @@ class Member:
 
     def __init__(self, **values: Any) -> None:
         kind = type(self).__name__
-        given = [name for name, field in self.fields.items() if not isinstance(field, Derived)]
+        given = self.given
         for name in values:
             if name not in given:
                 raise SceneError(f"{kind}: {unknown('field', name, given)}")
-        for name in given:
-            field = self.fields[name]
+        for name, field in given.items():
             value = values.get(name, field.default)
             if value is REQUIRED:
                 raise SceneError(f"{kind}.{name}: missing; it needs {field.allowed()}: {field.doc}")
@@ -78,7 +78,7 @@ class Member:
 
     def values(self) -> dict[str, Any]:
         """Field values by name, without derived ones."""
-        return {name: getattr(self, name) for name, field in self.fields.items() if not isinstance(field, Derived)}
+        return {name: getattr(self, name) for name in self.given}
 
     @classmethod
     def offsets(cls) -> tuple[int, ...]:
@@ -108,7 +108,7 @@ class Member:
         raise AttributeError(f"{type(self).__name__} is immutable; use .replace({name}=...)")
 
     def __repr__(self) -> str:
-        shown = [f"{n}={_short(v)}" for n, v in self.values().items() if v is not self.fields[n].default and not _default(self, n)]
+        shown = [f"{name}={_short(value)}" for name, value in self.values().items() if not _default(self, name)]
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
@@ -131,7 +131,7 @@ def _signature(fields: dict[str, Field]) -> inspect.Signature:
     keyword = inspect.Parameter.KEYWORD_ONLY
     return inspect.Signature([
         inspect.Parameter(name, keyword, default=inspect.Parameter.empty if f.default is REQUIRED else f.default)
-        for name, f in fields.items() if not isinstance(f, Derived)
+        for name, f in fields.items()
     ])  # fmt: skip
 
 

@@ -8,22 +8,22 @@ from scipy import integrate, stats
 
 from sightray._jit import kernel, native
 from sightray.errors import SceneError
-from sightray.filters.blackman_harris import BlackmanHarris
-from sightray.filters.box import Box
-from sightray.filters.gaussian import Gaussian
-from sightray.filters.mitchell import Mitchell
+from sightray.filters.blackman_harris import BlackmanHarrisFilter
+from sightray.filters.box import BoxFilter
+from sightray.filters.gaussian import GaussianFilter
+from sightray.filters.mitchell import MitchellFilter
 from sightray.filters.table import filter_table, sample_filter
-from sightray.filters.tent import Tent
+from sightray.filters.tent import TentFilter
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Space, Table, f64_at, f64_put
 from sightray.registry import members
 
 EXAMPLES = {
-    "Box": [Box(), Box(radius=1.7)],
-    "Tent": [Tent(), Tent(radius=0.3)],
-    "Gaussian": [Gaussian(), Gaussian(radius=3, sigma=1), Gaussian(sigma=1e3), Gaussian(radius=16, sigma=0.2)],
-    "Mitchell": [Mitchell(), Mitchell(radius=5)],
-    "BlackmanHarris": [BlackmanHarris(), BlackmanHarris(radius=0.75)],
+    "BoxFilter": [BoxFilter(), BoxFilter(radius=1.7)],
+    "TentFilter": [TentFilter(), TentFilter(radius=0.3)],
+    "GaussianFilter": [GaussianFilter(), GaussianFilter(radius=3, sigma=1), GaussianFilter(sigma=1e3), GaussianFilter(radius=16, sigma=0.2)],
+    "MitchellFilter": [MitchellFilter(), MitchellFilter(radius=5)],
+    "BlackmanHarrisFilter": [BlackmanHarrisFilter(), BlackmanHarrisFilter(radius=0.75)],
 }
 EVERY = [pytest.param(f, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() for i, f in enumerate(all_of)]
 
@@ -59,6 +59,13 @@ def test_no_filter_lacks_an_example():
     assert set(EXAMPLES) == {n for n, cls in members("filters").items() if cls.__module__.startswith("sightray.")}
 
 
+def test_no_name_stands_for_members_of_two_families():
+    """``sightray.<Name>`` finds members of all families."""
+    families = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters")
+    names = [name for family in families for name in members(family)]
+    assert sorted(names) == sorted(set(names))
+
+
 @pytest.mark.parametrize("filter", EVERY)
 def test_filters_are_even_one_at_the_centre_and_zero_beyond_the_radius(filter):
     x = np.linspace(0, filter.radius, 101)
@@ -74,7 +81,7 @@ def test_filters_other_than_the_box_end_without_a_step(filter):
     assert abs(filter.weight(filter.radius * (1 - 1e-9))) < 1e-4
 
 
-@pytest.mark.parametrize("filter", [Box(), Tent(), Mitchell()])
+@pytest.mark.parametrize("filter", [BoxFilter(), TentFilter(), MitchellFilter()])
 def test_neighbouring_pixels_weigh_a_point_by_one_in_total(filter):
     """A partition of unity: an even picture stays even."""
     x = np.random.default_rng(0).uniform(-0.5, 0.5, 100)
@@ -84,16 +91,24 @@ def test_neighbouring_pixels_weigh_a_point_by_one_in_total(filter):
 
 def test_mitchell_netravali_values():
     """B = C = 1/3: 8/9 at the centre, 1/18 at 1, over the unit integral; negative beyond."""
-    f = Mitchell()
+    f = MitchellFilter()
     assert f.weight(1.0) == pytest.approx((1 / 18) / (8 / 9), rel=1e-12)
     assert integral(f.weight, 2) == pytest.approx(1 / (8 / 9), rel=1e-9)
     assert f.weight(1.5) < 0
     assert f.weight(2.0) == pytest.approx(0, abs=1e-14)
 
 
+def test_gaussian_values():
+    """Far from its end the bell is exp(-x²/2 sigma²); near, the value at the radius is taken off."""
+    x = np.array([0, 0.5, 1, 2])
+    np.testing.assert_allclose(GaussianFilter(radius=16, sigma=1).weight(x), np.exp(-(x**2) / 2), rtol=1e-12)
+    end = np.exp(-4.5)
+    assert GaussianFilter(radius=1.5, sigma=0.5).weight(0.5) == pytest.approx((np.exp(-0.5) - end) / (1 - end), rel=1e-12)
+
+
 def test_harris_four_term_window_values():
-    assert BlackmanHarris(radius=1).weight(1.0) == pytest.approx(6e-5, abs=1e-12)
-    assert BlackmanHarris(radius=1).weight(0.5) == pytest.approx(0.35875 - 0.14128, abs=1e-12)
+    assert BlackmanHarrisFilter(radius=1).weight(1.0) == pytest.approx(6e-5, abs=1e-12)
+    assert BlackmanHarrisFilter(radius=1).weight(0.5) == pytest.approx(0.35875 - 0.14128, abs=1e-12)
 
 
 # --- sampling ------------------------------------------------------------------------------------------------------
@@ -142,7 +157,7 @@ def test_weights_are_one_on_average_and_carry_the_sign(filter):
 
 @pytest.mark.parametrize("filter", EVERY)
 def test_weighted_samples_integrate_what_the_filter_integrates(filter):
-    """The variance of the signed filter: Mitchell's negative lobes subtract."""
+    """The variance of the signed filter: MitchellFilter's negative lobes subtract."""
     offsets, weights = drawn(filter, evenly(1 << 18))
     r = filter.radius
     expected = integral(lambda x: filter.weight(x) * (x / r) ** 2, r) / integral(filter.weight, r)
@@ -150,9 +165,9 @@ def test_weighted_samples_integrate_what_the_filter_integrates(filter):
 
 
 @pytest.mark.parametrize(("make", "message"), [
-    (lambda: Box(radius=0), r"Box\.radius: got 0; allowed: a finite number > 0 and <= 16 \(pixels\)"),
-    (lambda: Gaussian(sigma=-1), r"Gaussian\.sigma: got -1"),
-    (lambda: Mitchell(b=1), r"Mitchell: unknown field 'b'"),
+    (lambda: BoxFilter(radius=0), r"BoxFilter\.radius: got 0; allowed: a finite number > 0 and <= 16 \(pixels\)"),
+    (lambda: GaussianFilter(sigma=-1), r"GaussianFilter\.sigma: got -1"),
+    (lambda: MitchellFilter(b=1), r"MitchellFilter: unknown field 'b'"),
 ])  # fmt: skip
 def test_errors_say_where_what_and_what_is_allowed(make, message):
     with pytest.raises(SceneError, match=message):

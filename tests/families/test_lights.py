@@ -200,6 +200,16 @@ def test_shirley_chiu_concentric_map_keeps_areas():
     pieces = np.histogram2d(x * x + y * y, np.arctan2(y, x), (10, 24), ((0, 1), (-math.pi, math.pi)))[0]
     assert pieces.sum() == len(points)
     assert stats.chisquare(pieces.ravel()).pvalue > 1e-3
+
+    # Neighbours stay neighbours, also across the diagonals, where the map changes its formula.
+    near = np.random.default_rng(1).uniform(0, 0.99, (10_000, 4))
+    moved = near + (1e-5, 1e-5, 0, 0) * np.random.default_rng(2).choice([-1, 0, 1], (10_000, 4))
+    near[:, 1] = np.where(np.arange(10_000) % 2, near[:, 0], 1 - near[:, 0])
+    moved[:, 1] = near[:, 1]
+    native(fold)(len(near), Table(near))
+    native(fold)(len(moved), Table(moved))
+    assert np.linalg.norm(near[:, :2] - moved[:, :2], axis=1).max() < 4e-5
+
     centre = np.array([[0.5, 0.5, 1, 1]])
     native(fold)(1, Table(centre))
     assert centre[0, :2].tolist() == [0, 0]

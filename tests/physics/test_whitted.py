@@ -61,8 +61,11 @@ def test_phong_terms(highlight):
     mirrored = 2 * n_l[..., None] * n - l
     cos_s = (n * half).sum(-1) if highlight == "blinn" else np.where(n_l > 0, -(mirrored * d).sum(-1), 0)
     arriving = 2 / (1 + 0.1 * r + 0.01 * r * r) * (n_l > 0)[..., None]  # the sphere shades its own back
-    expected = np.array([0.04, 0.08, 0.12]) + (0, 0, 0.05) + arriving * (
-        np.array([0.3, 0.2, 0.1]) * np.maximum(n_l, 0)[..., None] + 0.7 * np.maximum(cos_s, 0)[..., None] ** 12
+    expected = (
+        np.array([0.04, 0.08, 0.12])
+        + (0, 0, 0.05)
+        + arriving
+        * (np.array([0.3, 0.2, 0.1]) * np.maximum(n_l, 0)[..., None] + 0.7 * np.maximum(cos_s, 0)[..., None] ** 12)
     )
     assert hit.sum() > 100
     np.testing.assert_allclose(seen[hit], expected[hit], rtol=2e-6, atol=1e-7)
@@ -72,14 +75,19 @@ def test_phong_terms(highlight):
 def test_objects_beyond_a_point_light_cast_no_shadow():
     blocker = sr.Rectangle(corner=(-9, -9, 3), edge_u=(18, 0, 0), edge_v=(0, 18, 0))
     camera = sr.PerspectiveCamera(eye=(0, 0, 2.9), vfov=40, **SIZE)
-    near, far = (
-        picture(WALL, sr.PointLight(position=(0, 0, z), intensity=5), blocker, camera=camera) for z in (2, 4)
-    )
+    near, far = (picture(WALL, sr.PointLight(position=(0, 0, z), intensity=5), blocker, camera=camera) for z in (2, 4))
     assert near.min() > 0
     assert far.max() == 0
-    assert picture(
-        WALL, sr.PointLight(position=(0, 0, 4), intensity=5), blocker, camera=camera, integrator=sr.Whitted(shadows=False)
-    ).min() > 0
+    assert (
+        picture(
+            WALL,
+            sr.PointLight(position=(0, 0, 4), intensity=5),
+            blocker,
+            camera=camera,
+            integrator=sr.Whitted(shadows=False),
+        ).min()
+        > 0
+    )
 
 
 def test_plane_mirror_is_the_method_of_images():
@@ -187,7 +195,9 @@ def test_area_light_casts_a_penumbra_that_converges():
     light = sr.RectangleLight(corner=(-0.5, 4, -0.5), edge_u=(1, 0, 0), edge_v=(0, 0, 1), radiance=10, grid=16,
                               visible=False)  # fmt: skip
     floor = sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=sr.Lambert(albedo=1))
-    camera = sr.OrthographicCamera(eye=(0, 1.5, 0), target=(0, 0, 0), up=(0, 0, -1), view_height=1.0, width=65, height=3)
+    camera = sr.OrthographicCamera(
+        eye=(0, 1.5, 0), target=(0, 0, 0), up=(0, 0, -1), view_height=1.0, width=65, height=3
+    )
     scene = [floor, light.replace(two_sided=True)]
     open_sky = picture(*scene, camera=camera)[1, :, 0]
     share = picture(*scene, blocker, camera=camera)[1, :, 0] / open_sky

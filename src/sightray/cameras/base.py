@@ -7,6 +7,7 @@ row 0 is on top, and the centre of the top-left pixel is (0.5, 0.5). The camera'
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,45 @@ class Camera(Member, family="cameras"):
     width: int = integer("image width", default=640, at_least=1, at_most=MAX_SIDE, unit="pixels")
     height: int = integer("image height", default=480, at_least=1, at_most=MAX_SIDE, unit="pixels")
 
+    def world_from_camera(self) -> np.ndarray:
+        """Pose, (4, 4) float64: columns +x right, +y down, +z forward, and the eye."""
+        raise NotImplementedError(f"{type(self).__name__} does not state its pose")
+
+    def project(self, points: Any) -> np.ndarray:
+        """Where points are seen.
+
+        Parameters
+        ----------
+        points : (..., 3) float, metres, world
+
+        Returns
+        -------
+        (..., 2) float64, continuous pixel coordinates, also beyond the image; NaN for points behind the camera.
+        """
+        raise NotImplementedError(f"{type(self).__name__} cannot project points")
+
+    def rays(self, pixels: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Rays of sight: the same as `generate_ray`, for arrays.
+
+        Parameters
+        ----------
+        pixels : (..., 2) float, continuous pixel coordinates; the centre of the top-left pixel is (0.5, 0.5)
+
+        Returns
+        -------
+        origins, directions : (..., 3) float64 each, metres, world; directions have unit length.
+        """
+        raise NotImplementedError(f"{type(self).__name__} cannot list its rays")
+
+    def in_camera(self, points: Any) -> np.ndarray:
+        """World points in the camera's frame, (..., 3) float64, metres: x right, y down, z forward (the depth)."""
+        pose = self.world_from_camera()
+        return (coordinates(points, 3, f"{type(self).__name__}: points") - pose[:3, 3]) @ np.linalg.inv(pose[:3, :3]).T
+
+    def resized(self, width: int, height: int) -> Any:
+        """The same view with another number of pixels."""
+        return self.replace(width=width, height=height)
+
 
 @method(0)
 def generate_ray(camera: Table, x: f64, y: f64) -> Ray:
@@ -45,17 +85,13 @@ def generate_ray(camera: Table, x: f64, y: f64) -> Ray:
 class _Pinhole(Camera):
     """Perspective cameras in any parametrisation: all rays leave the eye, directions are linear in the pixel.
 
-    Subclasses state `pose` and `window`; direction = corner + x * right + y * down.
+    Subclasses state `world_from_camera` and `intrinsics`; direction = corner + x * right + y * down.
     """
 
     _eye: Any = derived_vector("centre of projection", lambda c: c.world_from_camera()[:3, 3])
     _corner: Any = derived_vector("direction to the top-left corner", lambda c: c.plane()[0])
     _right: Any = derived_vector("change of direction by one pixel to the right", lambda c: c.plane()[1])
     _down: Any = derived_vector("change of direction by one pixel down", lambda c: c.plane()[2])
-
-    def world_from_camera(self) -> np.ndarray:
-        """Pose, (4, 4) float64: columns +x right, +y down, +z forward, and the eye."""
-        raise NotImplementedError
 
     def intrinsics(self) -> np.ndarray:
         """Matrix K, (3, 3) float64, pixels: ``[u, v, 1] ~ K @ p_camera``, top-left pixel centre at (0.5, 0.5)."""
@@ -67,6 +103,18 @@ class _Pinhole(Camera):
         columns = self.world_from_camera()[:3, :3] @ inverse
         return np.stack([columns[:, 2], columns[:, 0], columns[:, 1]])
 
+    def project(self, points: Any) -> np.ndarray:
+        p = self.in_camera(points)
+        z = np.where(p[..., 2:] > 0, p[..., 2:], np.nan)
+        return (p / z) @ self.intrinsics()[:2].T
+
+    def rays(self, pixels: Any) -> tuple[np.ndarray, np.ndarray]:
+        corner, right, down = self.plane()
+        xy = coordinates(pixels, 2, f"{type(self).__name__}: pixels")
+        d = corner + xy[..., :1] * right + xy[..., 1:] * down
+        d /= np.linalg.norm(d, axis=-1, keepdims=True)
+        return np.broadcast_to(self.world_from_camera()[:3, 3], d.shape).copy(), d
+
 
 _EYE, _CORNER, _RIGHT, _DOWN = _Pinhole.offsets()[2:]
 
@@ -75,6 +123,25 @@ _EYE, _CORNER, _RIGHT, _DOWN = _Pinhole.offsets()[2:]
 def generate_pinhole_ray(camera: Table, x: f64, y: f64) -> Ray:
     d = vec3_at(camera, _CORNER) + vec3_at(camera, _RIGHT) * x + vec3_at(camera, _DOWN) * y
     return Ray(vec3_at(camera, _EYE), normalize(d))
+
+
+def coordinates(values: Any, columns: int, who: str) -> np.ndarray:
+    """`values` as float64 of shape (..., columns), or a `SceneError`."""
+    try:
+        found = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{who}: got {values!r}; allowed: an array of numbers of shape (..., {columns})") from None
+    if found.ndim == 0 or found.shape[-1] != columns:
+        raise SceneError(f"{who}: got an array of shape {found.shape}; allowed: (..., {columns})")
+    return found
+
+
+def rolled(pose: np.ndarray, degrees: float) -> np.ndarray:
+    """The pose after a clockwise turn about the line of sight, as the camera sees it."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    turn = np.eye(4)
+    turn[:2, :2] = [[c, -s], [s, c]]
+    return pose @ turn
 
 
 def look_at(eye: Any, target: Any, up: Any, who: str) -> np.ndarray:

@@ -14,7 +14,7 @@ PIXEL_WORDS = 7
 
 
 class Film:
-    """Accumulates samples. ``pixels`` (height, width, 7) float64: weighted sum (4), weight, squared luminance, count."""
+    """Accumulates samples. ``pixels`` (height, width, 7) float64: sum (4), weight, squared luminance, count."""
 
     def __init__(self, width: int, height: int):
         self.width, self.height = width, height

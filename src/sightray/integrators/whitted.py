@@ -26,7 +26,7 @@ from sightray.integrators.notes import (
 from sightray.lights.base import cells, illuminate
 from sightray.materials.base import BLINN, Local, local
 from sightray.mathlib.frame import reflect, refract
-from sightray.mathlib.rng import uniform
+from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_put, scratch, vec3_at, vec3_put
 from sightray.mathlib.vec import Vec3, dot, grey, max3, normalize, vabs, vexp
@@ -43,7 +43,8 @@ class Whitted(Integrator):
     A ray of sight takes the nearest surface's local illumination, with a shadow ray to every light, and splits into a
     mirrored and a refracted ray, which do the same::
 
-        I = emission + ambient + sum over lights of V L (diffuse + highlight) + mirror I_reflected + transmission I_refracted
+        I = emission + ambient + sum over lights of V L (diffuse + highlight)
+            + mirror I_reflected + transmission I_refracted
 
     Recursion ends at `max_depth` bounces after the ray of sight, and where a ray's weight falls to `cutoff`. Each
     stage can be switched off, so that the five pictures of the classic lecture are five calls: ray casting
@@ -166,14 +167,15 @@ def illuminated(
     n = point.shading
     if i64_at(integrator, TWO_SIDED) != 0 and point.cos_view < 0.0:
         n = -n
-    dimension = ray * 4096
+    own = stream(key, ray)
+    dimension = 0
     for index in range(light_count(world)):
         light = light_at(world, index)
         received = grey(0.0)
         seen = 0.0
         count = cells(light)
         for cell in range(count):
-            u, v = uniform(key, dimension), uniform(key, dimension + 1)
+            u, v = uniform(own, dimension), uniform(own, dimension + 1)
             dimension += 2
             sample = illuminate(light, point.p, cell, u, v)
             answer = reflected(terms, n, d, sample.direction) * sample.irradiance

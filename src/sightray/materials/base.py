@@ -6,8 +6,8 @@ in `local` how its surface answers light at one point:
     I = emission + ambient * I_ambient + sum over lights of V * L * (diffuse * max(n.l, 0) + highlight)
         + mirror * I_reflected + transmission * I_refracted
 
-`diffuse` multiplies irradiance, so a Lambertian surface states albedo / pi. The highlight is ``specular * cos^shininess``
-of the angle between the viewer and the mirrored light (Phong) or between the normal and the half vector (Blinn).
+`diffuse` multiplies irradiance, so a Lambertian surface states albedo / pi. The highlight is
+``specular * cos^shininess`` of the angle between the viewer and the mirrored light (Phong) or between the normal and the half vector (Blinn).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from sightray.fields import Color, color
 from sightray.materials.base import PHONG, Local, Material, local
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, table_at, vec3_at
-from sightray.mathlib.vec import Vec3, grey
+from sightray.mathlib.vec import grey
 from sightray.textures.base import Where, texture_value, textured
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from sightray.errors import SceneError
 from sightray.fields import child, other, text
 from sightray.lights.base import Light
-from sightray.mathlib.transform import Transform
+from sightray.mathlib.transform import Transform, as_transform
 from sightray.registry import Member
 from sightray.shapes.base import Shape
 
@@ -18,7 +18,7 @@ class _Placed(Member, family="scene"):
     """What groups and instances share."""
 
     transform: Transform = other(
-        "object to world", Transform, default=None, plain=lambda t: None if t.is_identity else t.matrix.tolist()
+        "object to world", as_transform, default=None, plain=lambda t: None if t.is_identity else t.matrix.tolist()
     )
     name: str = text("label for people and datasets", default="")
 

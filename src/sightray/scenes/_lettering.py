@@ -12,7 +12,7 @@ def lettering(text: str, size: int = 48) -> np.ndarray:
     from PIL import Image, ImageDraw, ImageFont
 
     font = ImageFont.load_default(size)
-    left, top, right, bottom = font.getbbox(text)
+    left, _, right, _ = font.getbbox(text)
     margin = size // 3
     plate = Image.new("L", (int(right - left) + 2 * margin, int(size * 1.2) + margin), 235)
     ImageDraw.Draw(plate).text((margin - left, margin // 2), text, font=font, fill=25)
@@ -21,7 +21,7 @@ def lettering(text: str, size: int = 48) -> np.ndarray:
 
 
 def plate(text: str, center: tuple[float, float, float], height: float, tilt: float = 0.5) -> sr.Rectangle:
-    """A plate of that height whose middle is at `center`, facing +z and leaning back by `tilt` (its depth per height)."""
+    """A plate with its middle at `center`, facing +z and leaning back by `tilt` (depth per height)."""
     image = lettering(text)
     width = height * image.shape[1] / image.shape[0]
     x, y, z = center

@@ -18,7 +18,9 @@ def stage(number: int) -> sr.Scene:
     integrator = list(STAGES.values())[number - 1]
     floor = sr.Phong(
         diffuse=sr.Checker(even=0.6, odd=(0.14, 0.25, 0.21), scale=1.0, mode="solid"),
-        ambient=0.6, mirror=0.15, specular=0,
+        ambient=0.6,
+        mirror=0.15,
+        specular=0,
     )
     red = sr.Phong(diffuse=(0.8, 0.12, 0.08), ambient=(0.8, 0.12, 0.08), specular=0.6, shininess=60, mirror=0.1)
     chrome = sr.Phong(diffuse=(0.15, 0.17, 0.2), ambient=(0.15, 0.17, 0.2), specular=0.8, shininess=150, mirror=0.7)

@@ -12,8 +12,15 @@ from sightray.scenes._lettering import plate
 from sightray.scenes.teapot import teapot_mesh
 
 COLUMNS = 4
-PITCH_X, PITCH_Z = 2.4, 2.9
-COLORS = ((0.8, 0.25, 0.15), (0.85, 0.6, 0.12), (0.25, 0.55, 0.25), (0.15, 0.4, 0.7), (0.5, 0.25, 0.6), (0.15, 0.6, 0.6))
+PITCH_X, PITCH_Z = 2.4, 3.3
+COLORS = (
+    (0.8, 0.25, 0.15),
+    (0.85, 0.6, 0.12),
+    (0.25, 0.55, 0.25),
+    (0.15, 0.4, 0.7),
+    (0.5, 0.25, 0.6),
+    (0.15, 0.6, 0.6),
+)
 
 
 def specimens() -> dict[str, Any]:
@@ -33,7 +40,7 @@ def specimens() -> dict[str, Any]:
         "Cylinder": sr.Cylinder(base=(0, 0, 0), top=(0, 1.2, 0), radius=0.5),
         "Cone": sr.Cone(base=(0, 0, 0), top=(0, 1.3, 0), base_radius=0.65, top_radius=0.2),
         "Quadric": sr.Instance(
-            of=sr.Quadric.hyperboloid(radii=(0.28, 0.28, 0.42), height=1.3),
+            of=sr.Quadric.hyperboloid(radii=(0.25, 0.25, 0.42), height=1.3),
             transform=lift(0, 0.65, 0) @ turn((1, 0, 0), -90),
         ),
         "Torus": sr.Torus(center=(0, 0.7, 0), axis=(0, 0.5, 1), major_radius=0.5, minor_radius=0.2),
@@ -47,7 +54,8 @@ def specimens() -> dict[str, Any]:
 
 def build() -> sr.Scene:
     floor = sr.Phong(diffuse=0.62, ambient=0.62, specular=0, mirror=0.08)
-    things = [sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=floor, name="Plane"), plate("Plane", (0, 0.16, 7.2), 0.32)]
+    things: list[Any] = [sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=floor, name="Plane")]
+    things.append(plate("Plane", (-2.4, 0.16, 7.9), 0.32))
     for index, (name, shape) in enumerate(specimens().items()):
         color = COLORS[index % len(COLORS)]
         x = (index % COLUMNS - (COLUMNS - 1) / 2) * PITCH_X
@@ -57,8 +65,8 @@ def build() -> sr.Scene:
         things.append(plate(name, (x, 0.16, z + 1.05), 0.32))
     return sr.Scene(
         *things,
-        sr.RectangleLight(corner=(-6, 10, 5), edge_u=(3, 0, 0), edge_v=(0, 2, -2), radiance=12, grid=3, visible=False),
-        sr.PointLight(position=(9, 8, 10), intensity=35),
-        camera=sr.PerspectiveCamera(eye=(0, 7.5, 13.5), target=(0, 0.35, 2.1), vfov=34, width=800, height=600),
+        sr.RectangleLight(corner=(-6, 11, 6), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=26, grid=3, visible=False),
+        sr.PointLight(position=(9, 8, 10), intensity=60),
+        camera=sr.PerspectiveCamera(eye=(0, 10.5, 15.5), target=(0, 0.2, 2.6), vfov=34, width=800, height=600),
         background=(0.7, 0.78, 0.88), ambient=0.25, samples=9, name="primitives",
     )  # fmt: skip

@@ -9,7 +9,9 @@ ROWS = ("###", "#  ", "###", "  #", "###")
 
 def build() -> sr.Scene:
     chrome = sr.Phong(diffuse=0.04, specular=0.6, shininess=99, mirror=0.72)
-    floor = sr.Phong(diffuse=sr.Checker(even=(0.6, 0.08, 0.06), odd=0.62, scale=1.0, mode="solid"), ambient=0.8, specular=0)
+    floor = sr.Phong(
+        diffuse=sr.Checker(even=(0.6, 0.08, 0.06), odd=0.62, scale=1.0, mode="solid"), ambient=0.8, specular=0
+    )
     balls = [
         sr.Sphere(center=(1.05 * (x - 1), 0.5 + 1.05 * (4 - y), -0.25 * (4 - y)), radius=0.5, material=chrome)
         for y, row in enumerate(ROWS) for x, mark in enumerate(row) if mark == "#"

@@ -33,7 +33,8 @@ def teapot_mesh(segments: int = 16, **options: object) -> sr.Mesh:
     """The pot as a `Mesh`, y up, standing on y = 0."""
     grid = teapot_grid(segments)
     turn = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], np.float64)  # (x, y, z) -> (x, z, -y)
-    return sr.Mesh(vertices=grid.vertices @ turn.T, faces=grid.faces, normals=grid.normals @ turn.T, uvs=grid.uvs, **options)
+    vertices, normals = grid.vertices @ turn.T, grid.normals @ turn.T
+    return sr.Mesh(vertices=vertices, faces=grid.faces, normals=normals, uvs=grid.uvs, **options)
 
 
 def build() -> sr.Scene:
@@ -45,8 +46,8 @@ def build() -> sr.Scene:
     return sr.Scene(
         teapot_mesh(material=glaze, name="teapot"),
         sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=table, name="table"),
-        sr.RectangleLight(corner=(-5, 8, 4), edge_u=(3, 0, 0), edge_v=(0, 2, -2), radiance=9, grid=4, visible=False),
-        sr.PointLight(position=(7, 5, 6), intensity=18),
-        camera=sr.PerspectiveCamera(eye=(2.6, 4.2, 8.4), target=(0.15, 1.35, 0), vfov=38, width=640, height=480),
+        sr.RectangleLight(corner=(-5, 9, 4), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=17, grid=4, visible=False),
+        sr.PointLight(position=(7, 5, 6), intensity=30),
+        camera=sr.PerspectiveCamera(eye=(2.6, 5.2, 8.6), target=(0.1, 1.2, 0), vfov=36, width=640, height=480),
         background=(0.62, 0.72, 0.85), ambient=0.18, samples=9, name="teapot",
     )  # fmt: skip

@@ -8,7 +8,8 @@ import sightray as sr
 def build() -> sr.Scene:
     floor = sr.Phong(
         diffuse=sr.Checker(even=(0.9, 0.75, 0.08), odd=(0.75, 0.08, 0.05), scale=1.0, mode="solid"),
-        ambient=(1, 0.6, 0.1), specular=0,
+        ambient=(1, 0.6, 0.1),
+        specular=0,
     )
     mirror = sr.Phong(diffuse=0.12, specular=0.5, shininess=120, mirror=0.75, ambient=0.3)
     return sr.Scene(

@@ -43,7 +43,10 @@ class Textured(Child):
             return value
         if isinstance(value, Member):
             raise SceneError(f"got {value!r}; allowed: {self.allowed()}")
-        return self._color.convert(value)
+        try:
+            return self._color.convert(value)
+        except SceneError:
+            raise self.wrong(value) from None
 
     def pack(self, row: Table, word: int, value: Any, packer: Packer) -> None:
         from sightray.textures.constant import Constant

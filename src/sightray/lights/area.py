@@ -1,0 +1,57 @@
+"""What the lights with an area have in common: radiance, a grid of cells, a shape that is seen.
+
+The irradiance that a small piece of area A sends to a surface which faces it at distance r is ``L A cos / r²``, with
+the cosine between the light's normal and the way to the receiver. A jittered point in each of the grid's cells gives
+an unbiased sum (R. Cook, "Stochastic sampling in computer graphics", ACM TOG 5(1), 1986).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sightray._jit import implements, kernel
+from sightray.fields import Color, color, flag, integer
+from sightray.lights.base import Light, LightSample, cells
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, i64_at
+from sightray.mathlib.vec import Vec3, dot, grey
+
+MAX_GRID = 64
+
+
+class _AreaLight(Light):
+    """Base of lights with an area: `radiance` in all directions from every point, cut into `grid` x `grid` cells."""
+
+    radiance: Color = color("radiance that it gives off", default=1.0, unit="W/(m² sr)")
+    grid: int = integer("cells along a side: grid x grid shadow rays", default=4, at_least=1, at_most=MAX_GRID)
+    visible: bool = flag("whether rays of sight see it", default=True)
+
+
+RADIANCE, GRID, VISIBLE = _AreaLight.offsets()
+
+
+@implements(cells, _AreaLight)
+def square_of_cells(light: Table) -> i64:
+    return i64_at(light, GRID) * i64_at(light, GRID)
+
+
+@kernel
+def place_in_grid(light: Table, cell: i64, u: f64, v: f64) -> Vec3:
+    """The point (u, v) of a cell, as x and y in the unit square that the grid divides."""
+    n = i64_at(light, GRID)
+    return Vec3((cell % n + u) / n, (cell // n + v) / n, 0.0, 0.0)
+
+
+@kernel
+def from_piece(p: Vec3, q: Vec3, normal: Vec3, radiant: Vec3, two_sided: bool) -> LightSample:
+    """Light at `p` from a small flat piece at `q`; `radiant` is its radiance times its area."""
+    to_light = q - p
+    r2 = dot(to_light, to_light)
+    if not r2 > 0.0:
+        return LightSample(-normal, 0.0, grey(0.0))
+    r = math.sqrt(r2)
+    to_light = to_light / r
+    cosine = -dot(to_light, normal)
+    if two_sided:
+        cosine = abs(cosine)
+    return LightSample(to_light, r, radiant * (max(cosine, 0.0) / r2))

@@ -1,0 +1,34 @@
+"""The sun: light from infinitely far away."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sightray._jit import implements
+from sightray.fields import Color, Point, color, derived_vector, vector
+from sightray.lights.base import Light, LightSample, illuminate
+from sightray.mathlib.axes import unit
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, vec3_at
+from sightray.mathlib.vec import Vec3
+
+
+class DirectionalLight(Light):
+    """Parallel light that travels along `direction` and brings the same `irradiance` everywhere.
+
+    `direction` is the way that the light goes, away from the sun, as in the glTF format; formats that state the way
+    *towards* the light have the opposite sign. Its length does not matter.
+    """
+
+    direction: Point = vector("the way that the light travels", default=(0.0, -1.0, 0.0), nonzero=True)
+    irradiance: Color = color("irradiance of a surface that faces the light", default=1.0, unit="W/m²")
+    _to_light: Any = derived_vector("unit vector towards the light", lambda light: -unit(light.direction))
+
+
+_, IRRADIANCE, TO_LIGHT = DirectionalLight.offsets()
+
+
+@implements(illuminate, DirectionalLight)
+def illuminate_from_afar(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
+    return LightSample(vec3_at(light, TO_LIGHT), math.inf, vec3_at(light, IRRADIANCE))

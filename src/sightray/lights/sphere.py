@@ -1,0 +1,74 @@
+"""A bulb: a sphere that shines."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sightray._jit import implements
+from sightray.fields import Point, number, vector
+from sightray.lights.area import GRID, RADIANCE, _AreaLight, place_in_grid
+from sightray.lights.base import LightSample, illuminate
+from sightray.mathlib.frame import perpendicular
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
+from sightray.mathlib.vec import Vec3, cross, grey, length
+
+
+class SphereLight(_AreaLight):
+    """Shines outwards from the whole surface of a sphere.
+
+    From distance d it fills a cone of half-angle asin(R/d), of solid angle Omega = 2 pi (1 - cos), within which light
+    comes in evenly. So the grid divides the cone instead of the surface: each cell brings the irradiance
+    ``L Omega/grid²`` from its direction, no ray is lost on the far side, and the sum for a surface that faces the
+    centre tends to ``pi L (R/d)²``. Nothing is lit inside.
+
+    Reference: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM
+    TOG 15(1), 1996.
+    """
+
+    center: Point = vector("centre", unit="m")
+    radius: float = number("radius", default=0.5, above=0, unit="m")
+
+    @property
+    def area(self) -> float:
+        """Area of the surface, m²."""
+        return 4 * math.pi * self.radius**2
+
+    def shape(self) -> Any | None:
+        """The shining `Sphere`, if `visible`."""
+        from sightray.materials.emitter import Emitter
+        from sightray.shapes.sphere import Sphere
+
+        if not self.visible:
+            return None
+        return Sphere(center=self.center, radius=self.radius, material=Emitter(radiance=self.radiance))
+
+
+CENTER, RADIUS = SphereLight.offsets()[3:]
+
+
+@implements(illuminate, SphereLight)
+def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
+    axis = vec3_at(light, CENTER) - p
+    d, radius = length(axis), f64_at(light, RADIUS)
+    if not d > radius:
+        return LightSample(Vec3(0.0, 1.0, 0.0, 0.0), radius, grey(0.0))
+    axis = axis / d
+
+    # Choose a direction in the cone; 1 - cos is taken from the sine, which does not cancel for small lights.
+    s = place_in_grid(light, cell, u, v)
+    sin2_max = (radius / d) * (radius / d)
+    cap = sin2_max / (1.0 + math.sqrt(max(0.0, 1.0 - sin2_max)))  # 1 - cos of the cone's half-angle
+    height = s.x * cap  # 1 - cos of the direction
+    sine = math.sqrt(max(0.0, height * (2.0 - height)))
+    across = perpendicular(axis)
+    phi = 2.0 * math.pi * s.y
+    side = across * math.cos(phi) + cross(axis, across) * math.sin(phi)
+    direction = axis * (1.0 - height) + side * sine
+
+    # Go to the near side of the sphere.
+    foot2 = radius * radius - d * d * sine * sine
+    distance = d * (1.0 - height) - math.sqrt(max(0.0, foot2))
+    n = i64_at(light, GRID)
+    return LightSample(direction, distance, vec3_at(light, RADIANCE) * (2.0 * math.pi * cap / (n * n)))

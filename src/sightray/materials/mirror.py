@@ -1,0 +1,31 @@
+"""Ideal mirror reflection."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sightray._jit import implements
+from sightray.materials.base import PHONG, Local, Material, local
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table, table_at
+from sightray.mathlib.vec import grey
+from sightray.textures.base import Where, texture_value, textured
+
+
+class Mirror(Material):
+    """Throws a share `reflectance` of the light back under the angle at which it came (Euclid, Catoptrics).
+
+    The same for every angle, and on both sides. Lights without extent do not show in it: their image is a point.
+    """
+
+    reflectance: Any = textured("share of light that is reflected", default=1.0, at_most=1.0)
+
+
+(REFLECTANCE,) = Mirror.offsets()
+
+
+@implements(local, Mirror)
+def local_of_mirror(material: Table, where: Where, cos_view: f64) -> Local:
+    zero = grey(0.0)
+    reflectance = texture_value(table_at(material, REFLECTANCE), where)
+    return Local(reflectance, zero, zero, zero, zero, 0.0, PHONG, reflectance, zero, 1.0, zero)

@@ -1,0 +1,127 @@
+"""A picture on a surface."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sightray._jit import implements, kernel
+from sightray.errors import SceneError
+from sightray.fields import choice, derived_array, derived_integer, derived_vector, flag, other
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, f32_at, i64_at, table_at, vec3_at
+from sightray.mathlib.vec import Vec3
+from sightray.textures.base import Texture, Where, texture_value
+
+NEAREST, BILINEAR = 0, 1
+REPEAT, CLAMP, MIRROR = 0, 1, 2
+
+
+def _source(value: Any) -> Any:
+    """A path, or a read-only (h, w, channels) float32 array."""
+    from sightray.images import Image
+
+    if isinstance(value, str | os.PathLike):
+        return Path(value)
+    try:
+        return (value if isinstance(value, Image) else Image(value)).pixels
+    except (TypeError, ValueError) as error:  # numbers in rows of unequal length, among others
+        raise SceneError(f"{error}. Or give the path of a picture") from None
+
+
+def _pair(value: Any) -> tuple[float, float]:
+    """Two finite numbers, or one for both."""
+    numbers = np.asarray(value)
+    if numbers.shape not in ((), (2,)) or numbers.dtype.kind not in "iuf" or not np.isfinite(numbers).all():
+        raise SceneError(f"got {value!r}; allowed: two finite numbers, for u and v, or one for both")
+    u, v = np.broadcast_to(numbers, 2).tolist()
+    return float(u), float(v)
+
+
+class Bitmap(Texture):
+    """A picture spread over the unit square of texture coordinates: u runs to the right, v upwards.
+
+    The picture's bottom-left corner is (u, v) = (0, 0), its top-right corner (1, 1); row 0 of the array is on top. In
+    a picture of w columns, texel i stands at u = (i + 1/2)/w. ``"bilinear"`` blends the four nearest texels,
+    ``"nearest"`` takes the one that covers the place. Outside the unit square the picture is repeated, mirrored at
+    each edge, or goes on with its border texels (``"clamp"``). It is looked up at ``scale * (u, v) + offset``.
+
+    Alpha is ignored and grey stands for three equal channels. Texels take 12 bytes each.
+
+    Reference: P. Heckbert, "Survey of texture mapping", IEEE CG&A 6(11), 1986.
+    """
+
+    image: Any = other("picture file, or linear floats of shape (h, w), (h, w, 1), (h, w, 3) or (h, w, 4)", _source,
+                       plain=lambda image: str(image) if isinstance(image, Path) else image.tolist())  # fmt: skip
+    filter: str = choice("how texels are blended", ("nearest", "bilinear"), default="bilinear")
+    wrap: str = choice("what lies beyond the edges", ("repeat", "clamp", "mirror"), default="repeat")
+    linear: bool = flag("whether a PNG or JPEG holds plain numbers; arrays are always linear", default=False)
+    scale: tuple[float, float] = other("pictures per unit of u and v", _pair, default=1.0, plain=list)
+    offset: tuple[float, float] = other("added to the scaled u and v", _pair, default=0.0, plain=list)
+    _scale: Any = derived_vector("scale of u and v", lambda b: (*b.scale, 0.0))
+    _offset: Any = derived_vector("offset of u and v", lambda b: (*b.offset, 0.0))
+    _width: Any = derived_integer("columns", lambda b: b.pixels.shape[1])
+    _height: Any = derived_integer("rows", lambda b: b.pixels.shape[0])
+    _texels: Any = derived_array("colours, three floats each", lambda b: b.pixels)
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """The texels as the kernels see them: (h, w, 3) float32, linear, read-only."""
+        return self.__dict__["_pixels"]
+
+    def check(self) -> None:
+        """Read the file once, so that a missing one is an error where the texture is stated."""
+        from sightray.images import load_image
+
+        where = self.image if isinstance(self.image, Path) else "the array"
+        found = load_image(where, linear=self.linear).pixels if isinstance(self.image, Path) else self.image
+        if not np.isfinite(found[..., :3]).all():
+            raise SceneError(f"Bitmap.image: {where} holds infinite or undefined numbers; allowed: finite ones")
+        texels = np.ascontiguousarray(np.broadcast_to(found[..., :3], (*found.shape[:2], 3)))
+        texels.flags.writeable = False
+        object.__setattr__(self, "_pixels", texels)
+
+
+FILTER, WRAP, _, SCALE, OFFSET, WIDTH, HEIGHT, TEXELS = Bitmap.offsets()
+
+
+@kernel
+def wrapped(i: f64, n: i64, wrap: i64) -> i64:
+    """Whole number i brought into 0 ... n - 1; it comes as a double, because far away it would overflow an integer."""
+    if wrap == REPEAT:
+        i -= n * np.floor(i / n)
+    elif wrap == MIRROR:
+        i -= 2 * n * np.floor(i / (2 * n))
+        if i >= n:
+            i = 2 * n - 1 - i
+    if not i > 0.0:  # so written that NaN becomes 0
+        return 0
+    return n - 1 if i >= n else int(i)
+
+
+@kernel
+def texel(texture: Table, column: f64, row: f64) -> Vec3:
+    """Colour of a texel; rows count from the bottom."""
+    w, h, wrap = i64_at(texture, WIDTH), i64_at(texture, HEIGHT), i64_at(texture, WRAP)
+    at = 3 * ((h - 1 - wrapped(row, h, wrap)) * w + wrapped(column, w, wrap))
+    texels = table_at(texture, TEXELS)
+    return Vec3(float(f32_at(texels, at)), float(f32_at(texels, at + 1)), float(f32_at(texels, at + 2)), 0.0)
+
+
+@implements(texture_value, Bitmap)
+def value_of_bitmap(texture: Table, where: Where) -> Vec3:
+    scale, offset = vec3_at(texture, SCALE), vec3_at(texture, OFFSET)
+    x = (where.u * scale.x + offset.x) * i64_at(texture, WIDTH)
+    y = (where.v * scale.y + offset.y) * i64_at(texture, HEIGHT)
+    if i64_at(texture, FILTER) == NEAREST:
+        return texel(texture, np.floor(x), np.floor(y))
+
+    # Blend the texels whose centres surround the place.
+    column, row = np.floor(x - 0.5), np.floor(y - 0.5)
+    s, t = x - 0.5 - column, y - 0.5 - row
+    low = texel(texture, column, row) * (1.0 - s) + texel(texture, column + 1.0, row) * s
+    high = texel(texture, column, row + 1.0) * (1.0 - s) + texel(texture, column + 1.0, row + 1.0) * s
+    return low * (1.0 - t) + high * t

@@ -92,16 +92,15 @@ def test_objects_beyond_a_point_light_cast_no_shadow():
 
 def test_plane_mirror_is_the_method_of_images():
     """What is seen in a mirror equals what is seen of the mirror image without it."""
-    ball = sr.Sphere(center=(-0.6, 0.4, 1.2), radius=0.5, material=sr.Lambert(albedo=(0.8, 0.3, 0.2)))
-    image = ball.replace(center=(-0.6, 0.4, -1.2))
+    camera = CAMERA.resized(96, 72)
+    ball = sr.Sphere(center=(-1.1, 0.7, 1.2), radius=0.5, material=sr.Lambert(albedo=(0.8, 0.3, 0.2)))
+    image = ball.replace(center=(-1.1, 0.7, -1.2))
     mirror = sr.Rectangle(corner=(-9, -9, 0), edge_u=(18, 0, 0), edge_v=(0, 18, 0), material=sr.Mirror())
-    reflected = picture(ball, mirror, sr.PointLight(position=(2, 3, 2), intensity=30))
-    direct = picture(image, sr.PointLight(position=(2, 3, -2), intensity=30))
-    # The ball itself hides part of its mirror image.
-    unhidden = picture(ball) == picture(image)
-    where = (picture(ball, ambient=1.0) == 0).all(-1) & unhidden.all(-1)
-    assert (direct[where] > 0).sum() > 30
-    np.testing.assert_allclose(reflected[where], direct[where], rtol=1e-5, atol=1e-7)
+    reflected = picture(ball, mirror, sr.PointLight(position=(2, 3, 2), intensity=30), camera=camera)
+    direct = picture(image, sr.PointLight(position=(2, 3, -2), intensity=30), camera=camera)
+    unhidden = (picture(ball, ambient=1.0, camera=camera) == 0).all(-1)  # the ball hides part of its mirror image
+    assert (direct[unhidden] > 0).sum() > 100
+    np.testing.assert_allclose(reflected[unhidden], direct[unhidden], rtol=1e-5, atol=1e-7)
 
 
 def test_two_mirrors_and_depth():

@@ -7,7 +7,8 @@ in `local` how its surface answers light at one point:
         + mirror * I_reflected + transmission * I_refracted
 
 `diffuse` multiplies irradiance, so a Lambertian surface states albedo / pi. The highlight is
-``specular * cos^shininess`` of the angle between the viewer and the mirrored light (Phong) or between the normal and the half vector (Blinn).
+``specular * cos^shininess`` of the angle between the viewer and the mirrored light (Phong) or between the normal and
+the half vector (Blinn).
 """
 
 from __future__ import annotations

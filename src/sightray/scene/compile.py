@@ -41,7 +41,7 @@ class Tables:
     def __init__(self) -> None:
         self.space = Space()
         self._rows: dict[int, tuple[Member, Table]] = {}
-        self._ready: set[tuple[Callable, bool]] = set()
+        self._ready: dict[tuple[Callable, bool], int] = {}  # how many rows there were when methods were filled in
 
     def row_of(self, member: Member) -> Table:
         """The row of a member; packed on first use. The member is kept alive, so its id stays its own."""
@@ -59,7 +59,7 @@ class Tables:
     def prepare(self, root: Callable, report: Report | None = None, compiled: bool | None = None) -> None:
         """Fill in the methods that the kernel `root` can reach, compiling what the cache does not have."""
         compiled = _jit.enabled() if compiled is None else compiled
-        if (root, compiled) in self._ready:
+        if self._ready.get((root, compiled)) == len(self._rows):
             return
         rows = list(self._rows.values())
         needed = _jit.needed_kernels(root, dict.fromkeys(type(member) for member, _ in rows))
@@ -75,7 +75,7 @@ class Tables:
         addresses = {k: _jit.address(k) if compiled else 0 for k in kernels}
         for member, row in rows:
             set_methods(row, [(slot, k, addresses[k]) for slot, k in needed[type(member)].items()])
-        self._ready.add((root, compiled))
+        self._ready[root, compiled] = len(self._rows)
 
 
 class Compiled:

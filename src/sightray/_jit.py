@@ -323,8 +323,14 @@ def _key(function: Callable) -> str:
     for callee in sorted(reachable(function), key=lambda f: (f.__module__, f.__qualname__)):
         code = getattr(callee, "__wrapped__", callee).__code__
         if not Path(code.co_filename).is_relative_to(_PACKAGE):
-            digest.update(marshal.dumps(code))
+            digest.update(marshal.dumps(code) + repr(_constants(callee, code)).encode())
     return digest.hexdigest()[:32]
+
+
+def _constants(function: Callable, code: types.CodeType) -> list[tuple[str, Any]]:
+    """Global numbers that a kernel reads: the compiler takes them for constants."""
+    scope = function.__globals__  # type: ignore[attr-defined]
+    return [(name, scope[name]) for name in sorted(_names(code)) if isinstance(scope.get(name), int | float)]
 
 
 def _cache_path(function: Callable) -> Path | None:

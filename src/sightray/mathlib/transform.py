@@ -58,7 +58,7 @@ class Transform:
 
     @classmethod
     def rotate(cls, axis: Any, degrees: float) -> Transform:
-        """Turn about an axis through the origin, counter-clockwise when the axis points at the viewer (Rodrigues, 1840)."""
+        """Turn about an axis through the origin, counter-clockwise if it points at the viewer (Rodrigues, 1840)."""
         a = np.asarray(axis, dtype=np.float64)
         size = np.linalg.norm(a)
         if a.shape != (3,) or not np.isfinite(size) or size == 0:
@@ -91,6 +91,12 @@ class Transform:
         """Whether nothing moves."""
         return bool((self.matrix == np.eye(4)).all())
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Transform) and bool((self.matrix == other.matrix).all())
+
+    def __hash__(self) -> int:
+        return hash(self.matrix.tobytes())
+
     def __repr__(self) -> str:
         return f"Transform({self.matrix.tolist()})"
 
@@ -107,6 +113,16 @@ def _inverse(m: np.ndarray) -> np.ndarray:
     return inverse
 
 
+IDENTITY = Transform()
+
+
+def as_transform(value: Any) -> Transform:
+    """A transform as it is, None as the identity, anything else as a 4x4 matrix."""
+    if isinstance(value, Transform):
+        return value
+    return IDENTITY if value is None else Transform(value)
+
+
 COLUMNS_WORDS = 16
 
 
@@ -118,7 +134,7 @@ def put_columns(table: Table, word: int, matrix: np.ndarray) -> None:
 @kernel
 def transform_point(table: Table, at: i64, p: Vec3) -> Vec3:
     """Map a point by the matrix whose columns stand at word `at`."""
-    return vec3_at(table, at) * p.x + vec3_at(table, at + 4) * p.y + vec3_at(table, at + 8) * p.z + vec3_at(table, at + 12)
+    return transform_vector(table, at, p) + vec3_at(table, at + 12)
 
 
 @kernel
@@ -130,6 +146,5 @@ def transform_vector(table: Table, at: i64, v: Vec3) -> Vec3:
 @kernel
 def transform_normal(table: Table, inverse_at: i64, n: Vec3) -> Vec3:
     """Map a normal by the transpose of the inverse matrix whose columns stand at word `inverse_at`."""
-    return Vec3(
-        dot(vec3_at(table, inverse_at), n), dot(vec3_at(table, inverse_at + 4), n), dot(vec3_at(table, inverse_at + 8), n)
-    )
+    x, y, z = vec3_at(table, inverse_at), vec3_at(table, inverse_at + 4), vec3_at(table, inverse_at + 8)
+    return Vec3(dot(x, n), dot(y, n), dot(z, n))

@@ -22,7 +22,7 @@ from sightray._jit import implements, method
 from sightray.fields import child, other, text
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table
-from sightray.mathlib.transform import Transform
+from sightray.mathlib.transform import Transform, as_transform
 from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
 from sightray.shapes.hit import Hit, is_hit
@@ -41,9 +41,10 @@ class Surface(NamedTuple):
 class Shape(Member, family="shapes"):
     """Base of all shapes."""
 
-    material: Any = child("what it is made of; None for a grey matte", "materials", default=None, optional=True, packed=False)
+    material: Any = child("what it is made of; None for a grey matte", "materials", default=None, optional=True,
+                          packed=False)  # fmt: skip
     transform: Transform = other(
-        "object to world", Transform, default=None, plain=lambda t: None if t.is_identity else t.matrix.tolist()
+        "object to world", as_transform, default=None, plain=lambda t: None if t.is_identity else t.matrix.tolist()
     )
     name: str = text("label for people and datasets", default="")
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from sightray._jit import implements
 from sightray.fields import Point, number, vector
+from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot
@@ -39,6 +40,8 @@ CENTER, RADIUS = Sphere.offsets()
 
 @implements(intersect, Sphere)
 def intersect_sphere(sphere: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Hit:
+    if not is_ray(o, d):
+        return miss()
     f = o - vec3_at(sphere, CENTER)
     r = f64_at(sphere, RADIUS)
     a = dot(d, d)

@@ -1,0 +1,144 @@
+"""Mesh."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from sightray._jit import METHOD_SLOTS, implements, kernel
+from sightray.accelerators.triangles import (
+    MESH_WORDS,
+    MeshTree,
+    any_triangle,
+    build_mesh,
+    closest_triangle,
+    pack_mesh,
+)
+from sightray.errors import SceneError
+from sightray.fields import Derived, Field, array
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Table, f64_at, i32_at, is_null, table_at
+from sightray.mathlib.vec import Vec3, cross, dot
+from sightray.shapes.base import Shape, Surface, intersect, occluded, surface
+from sightray.shapes.hit import Hit
+
+_SLIVER = 1e-15  # twice the area over the longest edge squared, up to which three corners count as on one line
+
+
+class _TreeHead(Field):
+    """The words in front of a mesh's row that rays read: the tree, its blocks, the triangles."""
+
+    words = MESH_WORDS - METHOD_SLOTS
+
+    def pack(self, row: Table, word: int, value: Any, packer: Any) -> None:
+        pack_mesh(packer.space, row, value)
+
+
+class Mesh(Shape):
+    """Triangles over shared vertices.
+
+    Rays find the nearest triangle through a tree of boxes (`accelerators.triangles`); the tree is built once for each
+    Mesh, when it is first rendered, and shared by all scenes and instances that show it. Two triangles that share an
+    edge leave no gap. ``faces`` runs counter-clockwise seen from the outer side: the geometric normal is
+    (b - a) × (c - a). With ``normals``, shading uses their mean weighted by the barycentric coordinates (B. Phong,
+    "Illumination for computer generated pictures", 1975); without, the geometric normal.
+
+    Texture coordinates: the weighted mean of ``uvs``, with the tangent along growing u; without ``uvs``, the
+    barycentric weights of the second and third corner. Part number: the row of ``faces``.
+
+    Triangles without area, and those that name a vertex twice, are dropped with a warning; ``faces`` holds the others,
+    and ``dropped`` the number that went.
+    """
+
+    tree_head = Derived("tree over the triangles", lambda mesh: mesh.tree(), _TreeHead)
+    vertices: np.ndarray = array("(n, 3) points", np.float64, columns=3, unit="m")
+    faces: np.ndarray = array("(m, 3) vertex numbers, from 0", np.int32, columns=3)
+    normals: np.ndarray | None = array("(n, 3) normals at the vertices", np.float64, columns=3, default=None)
+    uvs: np.ndarray | None = array("(n, 2) texture coordinates at the vertices", np.float64, columns=2, default=None)
+
+    dropped: int
+
+    def check(self) -> None:
+        n = len(self.vertices)
+        for name in ("normals", "uvs"):
+            values = getattr(self, name)
+            if values is not None and len(values) != n:
+                raise SceneError(f"Mesh.{name}: got {len(values)} rows; allowed: one for each of the {n} vertices")
+        if self.faces.size and not 0 <= self.faces.min() <= self.faces.max() < n:
+            bad = int(np.flatnonzero(((self.faces < 0) | (self.faces >= n)).any(axis=1))[0])
+            raise SceneError(f"Mesh.faces: row {bad}: got {self.faces[bad].tolist()}; allowed: numbers 0 to {n - 1}")
+
+        # Drop what has no area.
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+        keep = np.linalg.norm(np.cross(b - a, c - a), axis=1) > _SLIVER * longest
+        object.__setattr__(self, "dropped", int(len(keep) - keep.sum()))
+        if not keep.any():
+            raise SceneError(f"Mesh.faces: got {len(keep)} triangles, none with an area; allowed: at least one")
+        if self.dropped:
+            kept = np.ascontiguousarray(self.faces[keep])
+            kept.flags.writeable = False
+            object.__setattr__(self, "faces", kept)
+            warnings.warn(f"Mesh: {self.dropped} triangles without area were dropped", stacklevel=4)
+
+    def tree(self) -> MeshTree:
+        """The tree and the packed triangles, built on the first call."""
+        if "_tree" not in vars(self):
+            object.__setattr__(self, "_tree", build_mesh(*self._used()))
+        return vars(self)["_tree"]
+
+    def _used(self) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices and faces without vertices that no face names: a stray one would spoil the scale of the tree."""
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces] = True
+        if used.all():
+            return self.vertices, self.faces
+        return self.vertices[used], (np.cumsum(used) - 1).astype(np.int32)[self.faces]
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        points = self._used()[0]
+        return points.min(axis=0), points.max(axis=0)
+
+
+TREE_HEAD, VERTICES_GIVEN, FACES_GIVEN, NORMALS, UVS = Mesh.offsets()
+assert TREE_HEAD == METHOD_SLOTS, "the tree must stand first in a mesh's row"
+
+implements(intersect, Mesh)(closest_triangle)
+implements(occluded, Mesh)(any_triangle)
+
+
+@kernel
+def vec3_of(rows: Table, row: i64) -> Vec3:
+    """Row of an (n, 3) array."""
+    return Vec3(f64_at(rows, 3 * row), f64_at(rows, 3 * row + 1), f64_at(rows, 3 * row + 2))
+
+
+@implements(surface, Mesh)
+def surface_of_mesh(mesh: Table, hit: Hit, p: Vec3) -> Surface:
+    vertices, faces, first = table_at(mesh, VERTICES_GIVEN), table_at(mesh, FACES_GIVEN), 3 * hit.prim
+    i, j, k = int(i32_at(faces, first)), int(i32_at(faces, first + 1)), int(i32_at(faces, first + 2))
+    a = vec3_of(vertices, i)
+    e1, e2 = vec3_of(vertices, j) - a, vec3_of(vertices, k) - a
+    w0, w1, w2 = 1.0 - hit.u - hit.v, hit.u, hit.v
+    n = cross(e1, e2)
+    shading, tangent, u, v = n, e1, w1, w2
+
+    normals = table_at(mesh, NORMALS)
+    if not is_null(normals):
+        smooth = vec3_of(normals, i) * w0 + vec3_of(normals, j) * w1 + vec3_of(normals, k) * w2
+        if dot(smooth, smooth) > 0.0:
+            shading = smooth
+
+    # Solve e1 = du1 T + dv1 B, e2 = du2 T + dv2 B for the tangent T.
+    uvs = table_at(mesh, UVS)
+    if not is_null(uvs):
+        u0, v0 = f64_at(uvs, 2 * i), f64_at(uvs, 2 * i + 1)
+        du1, dv1 = f64_at(uvs, 2 * j) - u0, f64_at(uvs, 2 * j + 1) - v0
+        du2, dv2 = f64_at(uvs, 2 * k) - u0, f64_at(uvs, 2 * k + 1) - v0
+        u, v = u0 + du1 * w1 + du2 * w2, v0 + dv1 * w1 + dv2 * w2
+        det = du1 * dv2 - du2 * dv1
+        if det != 0.0:
+            tangent = (e1 * dv2 - e2 * dv1) / det
+    return Surface(n, shading, u, v, tangent)

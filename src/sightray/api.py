@@ -10,7 +10,7 @@ import numpy as np
 
 from sightray.engine.explain import Explanation
 from sightray.engine.progress import Callback
-from sightray.errors import SceneError
+from sightray.errors import SceneError, unknown
 from sightray.images import Image
 from sightray.registry import Member
 from sightray.scene.scene import Scene
@@ -119,6 +119,8 @@ def load(path: str | Path, **limits: Any) -> Scene:
 
     if str(path) in scenes.names():
         return scenes.build(str(path))
+    if not Path(path).suffix and not Path(path).exists():
+        raise SceneError(unknown("built-in scene", str(path), scenes.names()) + "; or a file's name with its suffix")
     return load_scene(path, **limits)
 
 

@@ -1,0 +1,130 @@
+"""glTF: nodes, accessors and materials arrive as the specification says."""
+
+import json
+import math
+
+import format_examples
+import numpy as np
+import pytest
+import trimesh
+from format_examples import assert_same, image_with_a_light_top_left, points, shapes
+
+from sightray.errors import FormatError, UnsupportedError
+from sightray.formats import load_scene
+from sightray.materials.glass import Glass
+from sightray.materials.lambert import Lambert
+from sightray.scene.instance import Instance
+
+write = format_examples.write
+
+
+def gltf(write, tree, arrays=(), name="a.gltf"):
+    """Write a glTF whose accessors are the given arrays, each in a buffer view of its own."""
+    kinds = {"f": 5126, "B": 5121, "H": 5123, "I": 5125}
+    blob, views, accessors = b"", [], []
+    for array in arrays:
+        views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": array.nbytes})
+        accessors.append({"bufferView": len(views) - 1, "count": len(array), "componentType": kinds[array.dtype.char],
+                          "type": "SCALAR" if array.ndim == 1 else f"VEC{array.shape[1]}"})  # fmt: skip
+        blob += array.tobytes() + b"\0" * (-array.nbytes % 4)
+    write("a.bin", blob)
+    base = {"asset": {"version": "2.0"}, "buffers": [{"uri": "a.bin", "byteLength": len(blob)}], "bufferViews": views}
+    base["accessors"] = accessors
+    for key, value in tree.items():
+        base[key] = value(base) if callable(value) else value
+    return write(name, json.dumps(base))
+
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32)
+
+
+def test_glb_keeps_textures_nodes_and_instances(tmp_path):
+    from PIL import Image
+
+    image_with_a_light_top_left(tmp_path / "p.png")
+    quad = trimesh.Trimesh(SQUARE, [[0, 1, 3], [0, 3, 2]], process=False)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.open(tmp_path / "p.png"))
+    quad.visual = trimesh.visual.TextureVisuals(uv=SQUARE[:, :2], material=material)
+    scene = trimesh.Scene()
+    scene.add_geometry(quad, geom_name="quad", node_name="left")
+    scene.add_geometry(quad, geom_name="quad", node_name="right", parent_node_name="left",
+                       transform=trimesh.transformations.translation_matrix([5, 0, 0]))  # fmt: skip
+    scene.export(tmp_path / "a.glb")
+    loaded = load_scene(tmp_path / "a.glb")
+    meshes = {part.of if isinstance(part, Instance) else part for part in shapes(loaded)}
+    for mesh in meshes:
+        assert np.allclose(mesh.uvs, SQUARE[:, :2])  # v upwards again, as trimesh has it
+        assert mesh.material.albedo.pixels[0, 0].tolist() == [1, 1, 1]
+    assert sorted(part.transform.matrix[0, 3] for part in shapes(loaded)) == [0, 5]
+
+
+def test_gltf_strips_fans_and_normalised_texture_coordinates(write):
+    uv = np.array([[0, 0], [65535, 0], [0, 65535], [65535, 65535]], np.uint16)
+    ring = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+
+    def normalise(base):
+        base["accessors"][1]["normalized"] = True
+        return [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "mode": 5},
+                                {"attributes": {"POSITION": 2}, "mode": 6},
+                                {"attributes": {"POSITION": 2}, "mode": 0}]}]  # fmt: skip
+
+    strip, fan = shapes(load_scene(gltf(write, {"meshes": normalise}, [SQUARE, uv, ring])))
+    for mesh in (strip, fan):
+        a, b, c = np.moveaxis(points(mesh), 1, 0)
+        assert np.cross(b - a, c - a)[:, 2].tolist() == [1, 1]
+    assert (strip.uvs == [[0, 1], [1, 1], [0, 0], [1, 0]]).all()
+
+
+def test_gltf_sparse_accessors_and_nodes_by_matrix_and_by_parts(write):
+    index, value = np.array([1], np.uint8), np.array([[3, 0, 0]], np.float32)
+
+    def sparse(base):
+        base["accessors"][0]["sparse"] = {"count": 1, "indices": {"bufferView": 1, "componentType": 5121},
+                                          "values": {"bufferView": 2}}  # fmt: skip
+        return [{"primitives": [{"attributes": {"POSITION": 0}}]}]
+
+    turn = math.sqrt(0.5)
+    nodes = [{"children": [1], "translation": [0, 0, 1]},
+             {"mesh": 0, "rotation": [0, 0, turn, turn], "scale": [2, 1, 1], "name": "leaf", "children": [2]},
+             {"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 7, 0, 0, 1]}]  # fmt: skip
+    tree = {"meshes": sparse, "nodes": nodes, "scenes": [{"nodes": [0]}]}
+    leaf, child = shapes(load_scene(gltf(write, tree, [SQUARE[:3], index, value])))
+    assert leaf.of is child.of
+    assert leaf.name == "leaf"
+    assert leaf.of.vertices.tolist() == [[0, 0, 0], [3, 0, 0], [0, 1, 0]]
+    assert np.allclose(leaf.transform.point([3, 0, 0]), [0, 6, 1])
+    assert np.allclose(child.transform.point([0, 0, 0]), [0, 14, 1])
+    nodes[2]["children"] = [1]
+    with pytest.raises(FormatError, match="node 1 stands in two places"):
+        load_scene(gltf(write, tree, [SQUARE[:3], index, value]))
+
+
+def test_gltf_materials(write):
+    def materials(base):
+        return [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 1]}, "emissiveFactor": [1, 0, 0],
+                 "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 5}}},
+                {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
+                                "KHR_materials_ior": {"ior": 1.4}}},
+                {"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}}]  # fmt: skip
+
+    meshes = [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(3)]}]
+    path = gltf(write, {"materials": materials, "meshes": meshes}, [SQUARE[:3]])
+    matte, clear, mirror = (mesh.material for mesh in shapes(load_scene(path)))
+    assert_same(matte, Lambert(albedo=(0.5, 0.25, 1), emission=(5, 0, 0)))
+    assert_same(clear, Glass(ior=1.4))
+    assert mirror.reflectance == (1, 1, 1)
+
+
+def test_gltf_claims_are_checked_before_memory_is_taken(write):
+    mesh = [{"primitives": [{"attributes": {"POSITION": 0}}]}]
+    for change in ({"count": 10**15}, {"count": -1}, {"count": 4}, {"componentType": 1}, {"type": "MAT9"},
+                   {"bufferView": 7}):  # fmt: skip
+        def accessors(base, change=change):
+            return [{**base["accessors"][0], **change}]
+
+        with pytest.raises(FormatError):
+            load_scene(gltf(write, {"accessors": accessors, "meshes": mesh}, [SQUARE[:3]]))
+    with pytest.raises(FormatError, match=r"file name '/etc/passwd\.bin'"):
+        load_scene(gltf(write, {"buffers": [{"uri": "/etc/passwd.bin"}], "meshes": mesh}, [SQUARE[:3]]))
+    with pytest.raises(UnsupportedError, match="KHR_draco"):
+        load_scene(gltf(write, {"extensionsRequired": ["KHR_draco_mesh_compression"]}))

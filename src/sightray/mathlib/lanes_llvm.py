@@ -1,0 +1,148 @@
+"""Float lanes as the machine sees them: vectors of floats and of bits. The lowering of mathlib/lanes.py for Numba."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import lower_builtin, models, register_model
+
+from sightray._jit import lower
+from sightray.mathlib import lanes
+from sightray.mathlib.table_llvm import element
+from sightray.mathlib.vec_llvm import llvm_function
+
+F32, F64, I1, I32, I64 = ir.FloatType(), ir.DoubleType(), ir.IntType(1), ir.IntType(32), ir.IntType(64)
+FLAGS = ("contract", "nsz")
+
+
+class LanesType(types.Type):
+    """Numba's name for a number of float lanes."""
+
+    def __init__(self, width: int):
+        self.width = width
+        super().__init__(f"F32x{width}")
+
+
+class MaskType(types.Type):
+    """Numba's name for a number of truth values."""
+
+    def __init__(self, width: int):
+        self.width = width
+        super().__init__(f"Mask{width}")
+
+
+@register_model(LanesType)
+class LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, ir.VectorType(F32, kind.width))
+
+
+@register_model(MaskType)
+class MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, ir.VectorType(I1, kind.width))
+
+
+TYPES = {
+    lanes.F32x4: LanesType(4), lanes.F32x8: LanesType(8), lanes.Mask4: MaskType(4), lanes.Mask8: MaskType(8),
+}  # fmt: skip
+
+
+def _operator(symbol: Any, operand: Any, compares: bool, emit: Any) -> None:
+    """Register an operator between two values of the same kind and width."""
+
+    @infer_global(symbol)
+    class Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) != 2 or not isinstance(args[0], operand) or args[0] != args[1]:
+                return None
+            return (MaskType(args[0].width) if compares else args[0])(*args)
+
+    lower_builtin(symbol, operand, operand)(lambda context, builder, sig, args: emit(builder, *args))
+
+
+def _arithmetic(instruction: str) -> Any:
+    return lambda builder, a, b: getattr(builder, instruction)(a, b, flags=FLAGS)
+
+
+def _comparison(sign: str) -> Any:
+    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+
+
+for _symbol, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+    _operator(_symbol, LanesType, False, _arithmetic(_instruction))
+for _symbol, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
+    _operator(_symbol, LanesType, True, _comparison(_sign))
+_operator(operator.and_, MaskType, False, lambda builder, a, b: builder.and_(a, b))
+_operator(operator.or_, MaskType, False, lambda builder, a, b: builder.or_(a, b))
+
+
+def _select(sign: str) -> Any:
+    """Minimum and maximum as compare and select, which the processor has as one instruction."""
+    return lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, a, b), a, b)
+
+
+def _lower_width(width: int) -> None:
+    """The primitives that exist in every width."""
+    kind = ir.VectorType(F32, width)
+    anything = ir.Constant(kind, ir.Undefined)
+    first = ir.Constant(ir.VectorType(I32, width), [0] * width)
+
+    def splat(builder: Any, value: Any) -> Any:
+        single = builder.insert_element(anything, builder.fptrunc(value, F32), I32(0))
+        return builder.shuffle_vector(single, anything, first)
+
+    def load(builder: Any, table: Any, index: Any) -> Any:
+        return builder.load(element(builder, table, index, kind, 4), align=4)
+
+    def store(builder: Any, table: Any, index: Any, a: Any) -> None:
+        builder.store(a, element(builder, table, index, kind, 4), align=4)
+
+    def movemask(builder: Any, mask: Any) -> Any:
+        return builder.zext(builder.bitcast(mask, ir.IntType(width)), I64)
+
+    for name, generate in (("splat", splat), ("load", load), ("store", store), ("movemask", movemask),
+                           ("vmin", _select("<")), ("vmax", _select(">"))):  # fmt: skip
+        lower(getattr(lanes, f"{name}{width}"))(generate)
+
+
+_lower_width(4)
+_lower_width(8)
+
+
+def _half(first: int) -> Any:
+    """Four of eight lanes."""
+    chosen = ir.Constant(ir.VectorType(I32, 4), [first, first + 1, first + 2, first + 3])
+    return lambda builder, a: builder.shuffle_vector(a, a, chosen)
+
+
+lower(lanes.low4)(_half(0))
+lower(lanes.high4)(_half(4))
+
+
+@lower(lanes.flip4)
+def flip4(builder: Any, a: Any, sign: Any) -> Any:
+    integers = ir.VectorType(I32, 4)
+    top = ir.Constant(integers, [-(1 << 31)] * 4)
+    flip = builder.and_(builder.bitcast(sign, integers), top)
+    return builder.bitcast(builder.xor(builder.bitcast(a, integers), flip), a.type)
+
+
+@lower(lanes.extract4)
+def extract4(builder: Any, a: Any, lane: Any) -> Any:
+    return builder.fpext(builder.extract_element(a, lane), F64)
+
+
+@lower(lanes.lowest_bit)
+def lowest_bit(builder: Any, bits: Any) -> Any:
+    return llvm_function(builder, "llvm.cttz.i64", I64, bits, I1(1))
+
+
+@lower(lanes.sort_key)
+def sort_key(builder: Any, distance: Any) -> Any:
+    bits = builder.bitcast(builder.fptrunc(distance, F32), I32)
+    return builder.shl(builder.sext(bits, I64), I64(32))

@@ -140,21 +140,26 @@ def test_triangulation_covers_concave_polygons_once():
 def test_mtl_becomes_lambert_phong_glass_and_bitmap(write, tmp_path):
     image_with_a_light_top_left(tmp_path / "a picture.png")
     write("m.mtl", "newmtl matte\nKd .5 .25 1\nKe 1 2 3\nnewmtl shiny\nKd 1 0 0\nKs .5 .5 .5\nNs 40\nillum 3\n"
-                   "newmtl clear\nd 0.1\nNi 1.33\nillum 4\nnewmtl pic\nmap_Kd a picture.png\nnewmtl lost\nKd 1 1 1\n"
-                   "map_Kd gone.png\nnewmtl spec\nKd .1 .1 .1\nKs 1 1 1\nNs 0\n")  # fmt: skip
-    names = ["matte", "shiny", "clear", "pic", "lost", "spec", "unknown"]
+                   "newmtl clear\nd 0.1\nNi 1.33\nillum 4\nnewmtl pic\nmap_Kd a picture.png\n"
+                   "newmtl spec\nKd .1 .1 .1\nKs 1 1 1\nNs 0\n")  # fmt: skip
+    names = ["matte", "shiny", "clear", "pic", "spec", "unknown"]
     faces = "".join(f"usemtl {name}\nf 1/1 2/2 3/3\n" for name in names)
     text = "mtllib ./m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
     found = {mesh.name: mesh.material for mesh in shapes(load_scene(write("a.obj", text + faces)))}
     assert list(found) == names
     assert_same(found["matte"], Lambert(albedo=(0.5, 0.25, 1), emission=(1, 2, 3)))
     assert_same(found["clear"], Glass(ior=1.33))
-    assert_same(found["lost"], Lambert(albedo=1))
     assert_same(found["spec"], Lambert(albedo=0.1))
     assert found["unknown"] is None
     assert (found["shiny"].mirror, found["shiny"].shininess) == ((0.5,) * 3, 40)
     assert found["shiny"].diffuse == (1 / math.pi, 0, 0)
     assert found["pic"].albedo.pixels[0, 0].tolist() == [1, 1, 1]
+    write("m.mtl", "newmtl lost\nKd 1 1 1\nmap_Kd gone.png\n")
+    with pytest.raises(FormatError, match=r"m\.mtl:1: .*gone\.png: no such file"):
+        load_scene(tmp_path / "a.obj")
+    (tmp_path / "m.mtl").unlink()
+    with pytest.warns(UserWarning, match=r"a\.obj:1: material library .*m\.mtl is missing"):
+        load_scene(tmp_path / "a.obj")
     write("m.mtl", "newmtl matte\nKd x 0 0\n")
     with pytest.raises(FormatError, match=r"m\.mtl:2: Kd: got 'x'"):
         load_scene(tmp_path / "a.obj")

@@ -1,7 +1,7 @@
 """glTF 2.0, ``.glb`` and ``.gltf``: triangle meshes at the nodes of a scene.
 
 Read here rather than by trimesh, which leaves sparse accessors at zero, does not scale normalised integers, skips
-triangle fans, second texture coordinates and texture transforms, drops a missing texture or what hangs below a camera
+triangle fans, second texture coordinates and texture transforms, drops what hangs below a camera
 without a word, and takes memory for as many elements as an accessor claims.
 
 A texture's v runs downwards in glTF and is turned here. Materials become `Lambert` of the base colour; those that
@@ -185,21 +185,18 @@ class Reader:
             ior = get(get(extensions, "KHR_materials_ior", dict, {}), "ior", number, 1.5)
             return Glass(ior=ior if ior > 0 else 1.5, tint=color), {}
         texture = get(pbr, "baseColorTexture", dict, {})
-        picture = self.texture(texture, color) if texture else None
-        albedo = color if picture is None else picture
+        albedo = self.texture(texture, color) if texture else color
         # Metal is the default, so it means a mirror only where it is stated, and together with a smooth surface.
         if pbr.get("metallicFactor") == 1 and get(pbr, "roughnessFactor", number, 1.0) < 0.1:
             return Mirror(reflectance=albedo), texture
         return Lambert(albedo=albedo, emission=emission), texture
 
     def texture(self, info: Any, factor: np.ndarray) -> Any:
-        """A picture times a factor, as its sampler wants it; None where its file is missing."""
+        """A picture times a factor, as its sampler wants it."""
         owner = self.file.item("textures", info.get("index"))
         if "source" not in owner:
             raise UnsupportedError(f"{self.path}: a texture of another kind than PNG or JPEG")
         picture = self.image(owner["source"])
-        if picture is None:
-            return None
         if (factor != 1).any():
             pixels = load_image(picture).pixels if isinstance(picture, Path) else picture
             picture = np.broadcast_to(pixels[..., :3], (*pixels.shape[:2], 3)) * factor.astype(np.float32)
@@ -208,7 +205,7 @@ class Reader:
                       filter="nearest" if sampler.get("magFilter") == 9728 else "bilinear")  # fmt: skip
 
     def image(self, index: Any) -> Any:
-        """Path of a picture, or the pixels of an embedded one; None where its file is missing."""
+        """Path of a picture, or the pixels of an embedded one."""
         owner = self.file.item("images", index)
         if index not in self.images:
             found: Any = None
@@ -222,7 +219,9 @@ class Reader:
                     file = Path(folder) / "embedded.png"
                     file.write_bytes(found)
                     found = load_image(file).pixels
-            self.images[index] = found if not isinstance(found, Path) or found.exists() else None
+            if isinstance(found, Path) and not found.exists():
+                raise FormatError(f"images: {found} is missing; expected a PNG or JPEG file there", self.path)
+            self.images[index] = found
         return self.images[index]
 
 

@@ -13,7 +13,8 @@ else                                        `Lambert`
 ==========================================  =====================================================
 
 Ke is radiance given off. Ka is not used (exporters write the same constant for every material), nor is Tr, which some
-write for transparency and others for its opposite. A texture that is missing, or given with options, falls back on Kd.
+write for transparency and others for its opposite. A texture given with options falls
+back on Kd; one that is missing is an error.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def _material(entries: Entries) -> Any:
         return Glass(ior=ior if ior > 0 and ior != 1.0 else 1.5, tint=tint)
     picture = entries.get("map_Kd")
     albedo = tuple(min(1.0, part) for part in diffuse)
-    if picture is not None and picture.exists():
+    if picture is not None:
         return Lambert(albedo=Bitmap(image=str(picture)), emission=emission)
     if max(specular) > 0 and shininess >= 1 and model not in (0, 1):
         return Phong(

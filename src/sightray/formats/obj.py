@@ -9,6 +9,7 @@ Texture coordinates need no turning: OBJ's v runs upwards, as Sightray's does.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -120,10 +121,12 @@ class Reader:
         return "/".join(indices)
 
     def library(self, name: str, line: int) -> None:
-        """A missing library is no error: OBJ files travel without theirs, and their shapes are worth seeing."""
+        """A missing library is only worth a warning: OBJ files travel without theirs, and their shapes can be seen."""
         path = asset(self.path, name, (".mtl",), line)
         if path.exists():
             self.materials.update(read_mtl(path, self.limits))
+        else:
+            warnings.warn(f"{self.path}:{line}: material library {path} is missing; shapes are grey", stacklevel=2)
 
     def meshes(self) -> list[Any]:
         """One mesh for each material (more where some of its faces have no normals or texture coordinates)."""

@@ -94,9 +94,10 @@ class Reader:
         if name not in COMMANDS:
             raise self.error(unknown("command", name[:40], [*COMMANDS, *CHOICES, *AMOUNTS, "output"]))
         count, action = COMMANDS[name]
-        if len(words) != count:
+        if len(words) < count:
             raise self.error(f"{name}: got {len(words)} number{'s' * (len(words) != 1)}; expected {count}")
-        return action(self, name, [number(word, name, self.path, self.line) for word in words])
+        # What follows the numbers is ignored, as by the readers that course scenes were written for.
+        return action(self, name, [number(word, name, self.path, self.line) for word in words[:count]])
 
     def error(self, message: str) -> FormatError:
         return FormatError(message, self.path, self.line)

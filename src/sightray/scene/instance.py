@@ -38,10 +38,18 @@ def _objects(values: Any) -> tuple[Any, ...]:
     return parts
 
 
+def _remember_depth(part: Any, inner: tuple[Any, ...]) -> None:
+    """Keep the depth with the part: asking all the way down takes exponential time where parts are shared."""
+    object.__setattr__(part, "levels", 1 + max((depth(p) for p in inner), default=0))
+
+
 class Group(_Placed):
     """Several objects that move as one and count as one instance in labels."""
 
     objects: tuple[Any, ...] = other("the parts: shapes, instances, groups", _objects, plain=list)
+
+    def check(self) -> None:
+        _remember_depth(self, self.objects)
 
 
 def _placeable(value: Any) -> Any:
@@ -59,8 +67,10 @@ class Instance(_Placed):
     material: Any = child("replaces the material of what is shown; None keeps it", "materials", default=None,
                           optional=True, packed=False)  # fmt: skip
 
+    def check(self) -> None:
+        _remember_depth(self, (self.of,))
+
 
 def depth(part: Any) -> int:
-    """Levels of nesting below and including `part`; 0 for a plain shape."""
-    inner = [part.of] if isinstance(part, Instance) else getattr(part, "objects", ())
-    return 1 + max((depth(p) for p in inner), default=0) if isinstance(part, _Placed) else 0
+    """Levels of nesting below and including `part`; 0 for a plain shape. Known from when the part was made."""
+    return getattr(part, "levels", 0)

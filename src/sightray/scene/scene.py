@@ -13,10 +13,14 @@ from sightray.shapes.base import Shape
 
 
 def _objects(values: Any) -> tuple[Any, ...]:
+    try:
+        values = tuple(values)
+    except TypeError:
+        raise SceneError(f"got {values!r}; allowed: a list of shapes, lights, groups and instances") from None
     for value in values:
         if not isinstance(value, Shape | Light | _Placed):
             raise SceneError(f"got {value!r}; allowed: shapes, lights, groups and instances")
-    return tuple(values)
+    return values
 
 
 class Scene(Member, family="scene"):

@@ -40,8 +40,8 @@ def specimens() -> dict[str, Any]:
         "Cylinder": sr.Cylinder(base=(0, 0, 0), top=(0, 1.2, 0), radius=0.5),
         "Cone": sr.Cone(base=(0, 0, 0), top=(0, 1.3, 0), base_radius=0.65, top_radius=0.2),
         "Quadric": sr.Instance(
-            of=sr.Quadric.hyperboloid(radii=(0.25, 0.25, 0.42), height=1.3),
-            transform=lift(0, 0.65, 0) @ turn((1, 0, 0), -90),
+            of=sr.Quadric.hyperboloid(radii=(0.28, 0.42, 0.28), height=1.3),
+            transform=lift(0, 0.65, 0),
         ),
         "Torus": sr.Torus(center=(0, 0.7, 0), axis=(0, 0.5, 1), major_radius=0.5, minor_radius=0.2),
         "Implicit": sr.Implicit(
@@ -65,8 +65,8 @@ def build() -> sr.Scene:
         things.append(plate(name, (x, 0.16, z + 1.05), 0.32))
     return sr.Scene(
         *things,
-        sr.RectangleLight(corner=(-6, 11, 6), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=26, grid=3, visible=False),
-        sr.PointLight(position=(9, 8, 10), intensity=60),
+        sr.RectangleLight(corner=(-6, 11, 6), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=14, grid=3, visible=False),
+        sr.PointLight(position=(9, 8, 10), intensity=36),
         camera=sr.PerspectiveCamera(eye=(0, 10.5, 15.5), target=(0, 0.2, 2.6), vfov=34, width=800, height=600),
         background=(0.7, 0.78, 0.88), ambient=0.25, samples=9, name="primitives",
     )  # fmt: skip

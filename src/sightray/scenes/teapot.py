@@ -46,8 +46,8 @@ def build() -> sr.Scene:
     return sr.Scene(
         teapot_mesh(material=glaze, name="teapot"),
         sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=table, name="table"),
-        sr.RectangleLight(corner=(-5, 9, 4), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=17, grid=4, visible=False),
-        sr.PointLight(position=(7, 5, 6), intensity=30),
+        sr.RectangleLight(corner=(-5, 9, 4), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=10, grid=4, visible=False),
+        sr.PointLight(position=(7, 5, 6), intensity=20),
         camera=sr.PerspectiveCamera(eye=(2.6, 5.2, 8.6), target=(0.1, 1.2, 0), vfov=36, width=640, height=480),
         background=(0.62, 0.72, 0.85), ambient=0.18, samples=9, name="teapot",
     )  # fmt: skip

@@ -255,10 +255,10 @@ def _dispatcher(function: Callable) -> Any:
     import numba
 
     sig = signature(function)
-    dispatcher = numba.njit(
-        nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True,
-        fastmath=False if function.__kernel__["exact"] else _FAST_MATH,  # type: ignore[attr-defined]
-    )(_linked(function))  # fmt: skip
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # only `native` calls from Python
+    options["fastmath"] = False if function.__kernel__["exact"] else _FAST_MATH  # type: ignore[attr-defined]
+    dispatcher = numba.njit(**options)(_linked(function))
     dispatcher.compile(sig)
     dispatcher.disable_compile()
     return dispatcher
@@ -424,11 +424,11 @@ def address(function: Callable) -> int:
         unit = _read(path)
         found = _load(unit) if unit is not None else None
         if found is None:
-            unit = _compile(function)
-            _write(path, unit)
-            found = _load(unit)
-        if found is None:
-            raise RuntimeError(f"cannot link {function.__qualname__}: a symbol is missing of {unit.needs}")
+            compiled = _compile(function)
+            _write(path, compiled)
+            found = _load(compiled)
+            if found is None:
+                raise RuntimeError(f"cannot link {function.__qualname__}: a symbol is missing of {compiled.needs}")
         return found
 
 
@@ -449,7 +449,7 @@ def native(function: Callable) -> Callable:
     hints = typing.get_type_hints(function)
     code = function.__code__  # type: ignore[attr-defined]
     kinds = [hints[name] for name in code.co_varnames[: code.co_argcount]]
-    ctype = {int: ctypes.c_int64, float: ctypes.c_double}
+    ctype: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double}
     result = ctype.get(hints["return"], ctypes.c_int64)
     prototype = ctypes.CFUNCTYPE(
         ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *(ctype.get(kind, ctypes.c_void_p) for kind in kinds)

@@ -21,7 +21,12 @@ from sightray.registry import members
 EXAMPLES = {
     "BoxFilter": [BoxFilter(), BoxFilter(radius=1.7)],
     "TentFilter": [TentFilter(), TentFilter(radius=0.3)],
-    "GaussianFilter": [GaussianFilter(), GaussianFilter(radius=3, sigma=1), GaussianFilter(sigma=1e3), GaussianFilter(radius=16, sigma=0.2)],
+    "GaussianFilter": [
+        GaussianFilter(),
+        GaussianFilter(radius=3, sigma=1),
+        GaussianFilter(sigma=1e3),
+        GaussianFilter(radius=16, sigma=0.2),
+    ],
     "MitchellFilter": [MitchellFilter(), MitchellFilter(radius=5)],
     "BlackmanHarrisFilter": [BlackmanHarrisFilter(), BlackmanHarrisFilter(radius=0.75)],
 }
@@ -103,7 +108,9 @@ def test_gaussian_values():
     x = np.array([0, 0.5, 1, 2])
     np.testing.assert_allclose(GaussianFilter(radius=16, sigma=1).weight(x), np.exp(-(x**2) / 2), rtol=1e-12)
     end = np.exp(-4.5)
-    assert GaussianFilter(radius=1.5, sigma=0.5).weight(0.5) == pytest.approx((np.exp(-0.5) - end) / (1 - end), rel=1e-12)
+    assert GaussianFilter(radius=1.5, sigma=0.5).weight(0.5) == pytest.approx(
+        (np.exp(-0.5) - end) / (1 - end), rel=1e-12
+    )
 
 
 def test_harris_four_term_window_values():

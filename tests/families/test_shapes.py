@@ -26,7 +26,6 @@ from sightray.scene.items import (
     occluded_item,
     to_object,
 )
-from sightray.shapes.sphere import Sphere
 
 RAY, OUT = 12, 24
 ALL = [pytest.param(e, id=f"{name}-{i}") for name, examples in EXAMPLES.items() for i, e in enumerate(examples)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -53,10 +54,13 @@ def test_lecture_strip(tmp_path):
     import lecture_stages
 
     scene = sr.load("stage5-refractions")
-    picture = np.asarray(lecture_stages.strip(scene.replace(camera=scene.camera.resized(60, 45), samples=1))).astype(int)
+    picture = np.asarray(lecture_stages.strip(scene.replace(camera=scene.camera.resized(60, 45), samples=1))).astype(
+        int
+    )
     assert picture.shape == (45 + 32, 300, 3)
     stages = [picture[:45, 60 * k : 60 * k + 60] for k in range(5)]
-    for before, after in zip(stages, stages[1:], strict=False):
+    for before, after in pairwise(stages):
         assert (np.abs(before - after).max(axis=-1) > 20).mean() > 0.01
     # Shadows only darken; mirrored rays add light.
-    assert (stages[2].sum() < stages[1].sum()) and (stages[3].sum() > stages[2].sum())
+    assert stages[2].sum() < stages[1].sum()
+    assert stages[3].sum() > stages[2].sum()

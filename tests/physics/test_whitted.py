@@ -141,8 +141,8 @@ def test_slab_of_glass_transmits_and_displaces_as_snell_and_fresnel_say():
     assert np.unique(np.round(seen, 5)) == pytest.approx([0, transmitted], rel=1e-4)
     # Shift of the checks along x: thickness (tan i - tan t), against the camera moved by the same.
     shift = 2 * (sin_i / cos_i - (sin_i / 1.5) / cos_t)
-    eye, target = np.array([3.0, 0, 5]), np.zeros(3)
-    moved = sr.OrthographicCamera(eye=eye + (shift, 0, 0), target=target + (shift, 0, 0), view_height=6, **SIZE)
+    eye, target, along = np.array([3.0, 0, 5]), np.zeros(3), np.array([shift, 0, 0])
+    moved = sr.OrthographicCamera(eye=eye + along, target=target + along, view_height=6, **SIZE)
     expected = picture(back, camera=moved, ambient=1.0) * transmitted
     assert (np.abs(seen - expected) > 1e-5).mean() < 0.01
     assert (np.abs(plain * transmitted - expected) > 1e-5).mean() > 0.05

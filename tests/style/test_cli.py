@@ -52,7 +52,9 @@ def test_default_output_is_beside_the_user_not_the_scene(tmp_path):
 
 def test_same_seed_same_file(tmp_path):
     for name in ("a.npy", "b.npy"):
-        sightray("render", "whitted", "-o", tmp_path / name, "--width", 40, "--seed", 7, "--threads", len(name) - 3, "-q")
+        sightray(
+            "render", "whitted", "-o", tmp_path / name, "--width", 40, "--seed", 7, "--threads", len(name) - 3, "-q"
+        )
     assert (tmp_path / "a.npy").read_bytes() == (tmp_path / "b.npy").read_bytes()
 
 

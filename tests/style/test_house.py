@@ -47,7 +47,7 @@ def test_every_member_is_found_by_name_and_documented():
         for name, cls in members(family).items():
             if cls.__module__.startswith("sightray."):
                 assert getattr(sr, name) is cls
-                assert cls.__doc__ and len(cls.__doc__) > 20, name
+                assert len(cls.__doc__ or "") > 20, name
                 for field in cls.fields.values():
                     assert field.doc, (name, field.name)
 

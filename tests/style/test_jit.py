@@ -16,8 +16,24 @@ from sightray._jit import implements, kernel, method, native, needed_kernels
 from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import (
-    Space, Table, advance, f32_at, f32_put, f64_at, f64_put, i32_at, i32_put, i64_at, i64_put, is_null, link, scratch,
-    set_methods, table_at, vec3_at, vec3_put,
+    Space,
+    Table,
+    advance,
+    f32_at,
+    f32_put,
+    f64_at,
+    f64_put,
+    i32_at,
+    i32_put,
+    i64_at,
+    i64_put,
+    is_null,
+    link,
+    scratch,
+    set_methods,
+    table_at,
+    vec3_at,
+    vec3_put,
 )  # fmt: skip
 from sightray.mathlib.vec import Vec3, cross, dot, grey, length, max3, normalize, vabs, vexp, vmax, vmin
 

@@ -112,7 +112,7 @@ lower_builtin(vec.Vec3, *[types.float64] * 4)(construct)
 class Components(AttributeTemplate):
     key = Vec3Type
 
-    def generic_resolve(self, kind: Any, name: str) -> Any:
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
         return types.float64 if name in ("x", "y", "z", "w") else None
 
 

@@ -14,14 +14,14 @@ WHITE, GREEN, RED = (0.885809, 0.698859, 0.666422), (0.105421, 0.37798, 0.076425
 LIGHT = (18.387, 13.9873, 6.75357)  # W/(m² sr)
 
 # Corners of the faces in millimetres, counter-clockwise seen from where they are seen; the box opens towards -z.
-WALLS = {
+WALLS: dict[str, tuple[tuple[float, float, float], list[Any]]] = {
     "floor": (WHITE, [(552.8, 0, 0), (0, 0, 0), (0, 0, 559.2), (549.6, 0, 559.2)]),
     "ceiling": (WHITE, [(556, 548.8, 0), (556, 548.8, 559.2), (0, 548.8, 559.2), (0, 548.8, 0)]),
     "back wall": (WHITE, [(549.6, 0, 559.2), (0, 0, 559.2), (0, 548.8, 559.2), (556, 548.8, 559.2)]),
     "right wall": (GREEN, [(0, 0, 559.2), (0, 0, 0), (0, 548.8, 0), (0, 548.8, 559.2)]),
     "left wall": (RED, [(552.8, 0, 0), (549.6, 0, 559.2), (556, 548.8, 559.2), (556, 548.8, 0)]),
 }
-BLOCKS = {
+BLOCKS: dict[str, list[list[Any]]] = {
     "short block": [
         [(130, 165, 65), (82, 165, 225), (240, 165, 272), (290, 165, 114)],
         [(290, 0, 114), (290, 165, 114), (240, 165, 272), (240, 0, 272)],

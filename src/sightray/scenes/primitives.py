@@ -65,8 +65,8 @@ def build() -> sr.Scene:
         things.append(plate(name, (x, 0.16, z + 1.05), 0.32))
     return sr.Scene(
         *things,
-        sr.RectangleLight(corner=(-6, 11, 6), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=14, grid=3, visible=False),
+        sr.RectangleLight(corner=(-6, 11, 6), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=14, grid=2, visible=False),
         sr.PointLight(position=(9, 8, 10), intensity=36),
         camera=sr.PerspectiveCamera(eye=(0, 10.5, 15.5), target=(0, 0.2, 2.6), vfov=34, width=800, height=600),
-        background=(0.7, 0.78, 0.88), ambient=0.25, samples=9, name="primitives",
+        background=(0.7, 0.78, 0.88), ambient=0.25, samples=4, name="primitives",
     )  # fmt: skip

@@ -12,13 +12,13 @@ from sightray.scenes._teapot_patches import MIRRORED, TURNED
 def patches() -> list[np.ndarray]:
     """The 32 control grids, each (4, 4, 3): z up, spout towards +x."""
     found = []
-    for grid in TURNED.values():
-        control = np.array(grid)
+    for turned in TURNED.values():
+        control = np.array(turned)
         for _ in range(4):
             found.append(control)
             control = np.stack([-control[..., 1], control[..., 0], control[..., 2]], axis=-1)
-    for grid in MIRRORED.values():
-        control = np.array(grid)
+    for mirrored in MIRRORED.values():
+        control = np.array(mirrored)
         # Turning the grid about keeps the normals of the mirror image outside.
         found += [control, (control * (1, -1, 1))[:, ::-1]]
     return found
@@ -46,7 +46,7 @@ def build() -> sr.Scene:
     return sr.Scene(
         teapot_mesh(material=glaze, name="teapot"),
         sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=table, name="table"),
-        sr.RectangleLight(corner=(-5, 9, 4), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=10, grid=4, visible=False),
+        sr.RectangleLight(corner=(-5, 9, 4), edge_u=(3, 0, 0), edge_v=(0, -2, 2), radiance=10, grid=3, visible=False),
         sr.PointLight(position=(7, 5, 6), intensity=20),
         camera=sr.PerspectiveCamera(eye=(2.6, 5.2, 8.6), target=(0.1, 1.2, 0), vfov=36, width=640, height=480),
         background=(0.62, 0.72, 0.85), ambient=0.18, samples=9, name="teapot",

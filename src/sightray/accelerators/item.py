@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sightray._jit import kernel
+from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, i64_at, table_at
 from sightray.mathlib.transform import transform_normal, transform_point, transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.shapes.base import Surface, intersect, occluded, surface
-from sightray.shapes.hit import Hit
 
 SHAPE, MATERIAL, MOVED, OBJECT = 0, 1, 2, 3  # MOVED: 0 where object space is world space
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24

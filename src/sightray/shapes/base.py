@@ -20,12 +20,12 @@ import numpy as np
 
 from sightray._jit import implements, method
 from sightray.fields import child, other, text
+from sightray.mathlib.hit import Hit, is_hit
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table
 from sightray.mathlib.transform import Transform, as_transform
 from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
-from sightray.shapes.hit import Hit, is_hit
 
 
 class Surface(NamedTuple):

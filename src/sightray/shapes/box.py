@@ -8,12 +8,12 @@ from sightray._jit import implements
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_array, vector
 from sightray.mathlib.axes import axes_across
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.slabs import slab
 from sightray.mathlib.table import Table, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 def _faces(box: Box) -> np.ndarray:

@@ -10,13 +10,13 @@ from sightray._jit import implements
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_vector, number, vector
 from sightray.mathlib.axes import axes_across, unit
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.transform import transform_normal, transform_vector
 from sightray.mathlib.turns import turn
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 class Disk(Shape):

@@ -12,6 +12,7 @@ from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_array, derived_integer, integer, other, vector
 from sightray.mathlib.expression import compile_expression
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.interpret import bound_on_ray
 from sightray.mathlib.isolate import first_root
 from sightray.mathlib.rays import is_ray
@@ -21,7 +22,6 @@ from sightray.mathlib.table import Table, i64_at, table_at, vec3_at
 from sightray.mathlib.turns import tangent_around_y, turn
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 def _expression(text: Any) -> str:

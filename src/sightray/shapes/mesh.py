@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sightray._jit import METHOD_SLOTS, implements, kernel
-from sightray.accelerators.triangles import (
+from sightray.bvh.triangles import (
     MESH_WORDS,
     MeshTree,
     any_triangle,
@@ -18,11 +18,11 @@ from sightray.accelerators.triangles import (
 )
 from sightray.errors import SceneError
 from sightray.fields import Derived, Field, array
+from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, i32_at, is_null, table_at
 from sightray.mathlib.vec import Vec3, cross, dot
 from sightray.shapes.base import Shape, Surface, intersect, occluded, surface
-from sightray.shapes.hit import Hit
 
 _SLIVER = 1e-15  # twice the area over the longest edge squared, up to which three corners count as on one line
 
@@ -39,7 +39,7 @@ class _TreeHead(Field):
 class Mesh(Shape):
     """Triangles over shared vertices.
 
-    Rays find the nearest triangle through a tree of boxes (`accelerators.triangles`); the tree is built once for each
+    Rays find the nearest triangle through a tree of boxes (`bvh.triangles`); the tree is built once for each
     Mesh, when it is first rendered, and shared by all scenes and instances that show it. Two triangles that share an
     edge leave no gap. ``faces`` runs counter-clockwise seen from the outer side: the geometric normal is
     (b - a) × (c - a). With ``normals``, shading uses their mean weighted by the barycentric coordinates (B. Phong,

@@ -9,11 +9,11 @@ import numpy as np
 from sightray._jit import implements
 from sightray.fields import Point, derived_vector, vector
 from sightray.mathlib.axes import axes_across
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, vec3_at
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 class Plane(Shape):

@@ -10,11 +10,11 @@ from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import derived_array, derived_integer, derived_vector, other
 from sightray.mathlib.axes import axes_across
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 _FLATNESS = 1e-6  # of the outline's size
 

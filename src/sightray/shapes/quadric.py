@@ -10,6 +10,7 @@ import numpy as np
 from sightray._jit import implements
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_number, derived_vector, number, vector
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.quadratic import quadratic
 from sightray.mathlib.rays import first_within, is_ray, nearest_parameter
 from sightray.mathlib.scalars import f64
@@ -19,7 +20,6 @@ from sightray.mathlib.transform import Transform, transform_vector
 from sightray.mathlib.turns import tangent_around_y, turn
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 def _sizes(*values: float) -> list[float]:

@@ -8,13 +8,13 @@ from collections.abc import Callable
 
 from sightray._jit import kernel, method
 from sightray.errors import SceneError
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.slabs import box_span
 from sightray.mathlib.table import Table, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, length
 from sightray.shapes.base import Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 from sightray.shapes.implicit import LOWER, SAMPLES, UPPER, surface_in_box
 
 _STEP = 1e-5  # of the box's diagonal: balances truncation and rounding of central differences

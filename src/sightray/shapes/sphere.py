@@ -8,12 +8,12 @@ import numpy as np
 
 from sightray._jit import implements
 from sightray.fields import Point, number, vector
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 class Sphere(Shape):

@@ -10,6 +10,7 @@ from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_number, derived_vector, flag, vector
 from sightray.mathlib.axes import axes_across
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.quadratic import quadratic
 from sightray.mathlib.rays import is_ray, nearest_parameter
 from sightray.mathlib.scalars import f64
@@ -19,7 +20,6 @@ from sightray.mathlib.transform import transform_normal, transform_vector
 from sightray.mathlib.turns import turn
 from sightray.mathlib.vec import Vec3
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 class _Tapered(Shape):

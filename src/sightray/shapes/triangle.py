@@ -8,12 +8,12 @@ from sightray._jit import implements
 from sightray.errors import SceneError
 from sightray.fields import Point, vector
 from sightray.mathlib.axes import unit
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, vec3_at
 from sightray.mathlib.triangle_tests import moeller_trumbore
 from sightray.mathlib.vec import Vec3, cross
 from sightray.shapes.base import Shape, Surface, intersect, surface
-from sightray.shapes.hit import Hit, miss
 
 
 class Triangle(Shape):

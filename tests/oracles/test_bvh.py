@@ -10,9 +10,9 @@ import trimesh
 
 import sightray as sr
 from sightray._jit import kernel, native
+from sightray.accelerators.bvh import any_item, closest_item, pack_items
 from sightray.bvh.binned_sah import Bvh8, build, build_nodes
 from sightray.bvh.bvh8 import CHILDREN, LEAF, MAX_LEVELS, STACK_WORDS
-from sightray.accelerators.items import any_item, closest_item, pack_items
 from sightray.bvh.triangles import (
     BLOCKS,
     MESH_WORDS,
@@ -23,11 +23,11 @@ from sightray.bvh.triangles import (
     pack_mesh,
     shear,
 )
+from sightray.mathlib.hit import is_hit, miss
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, aligned, f64_at, f64_put, i64_put, table_at
 from sightray.mathlib.vec import Vec3
 from sightray.scene.compile import Compiled
-from sightray.mathlib.hit import is_hit, miss
 
 # ---------------------------------------------------------------------------------------------------- asking the tables
 

@@ -1,6 +1,7 @@
 """Items: one shape at one place. The leaves of the scene's tree.
 
-An item row is `ITEM_WORDS` words: where its shape and material stand, and the two matrices between world and object.
+An item row is `ITEM_WORDS` words: where its shape and material stand, the number of the scene's object that it belongs
+to, the number of the light that it is the shape of (or -1), and the two matrices between world and object.
 Instances share the shape's row, and so its triangles and its tree.
 """
 
@@ -16,7 +17,7 @@ from sightray.mathlib.transform import transform_normal, transform_point, transf
 from sightray.mathlib.vec import Vec3
 from sightray.shapes.base import Surface, intersect, occluded, surface
 
-SHAPE, MATERIAL, MOVED, OBJECT = 0, 1, 2, 3  # MOVED: 0 where object space is world space
+SHAPE, MATERIAL, MOVED, OBJECT, LIGHT = 0, 1, 2, 3, 4  # MOVED: 0 where object space is world space
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
 ITEM_WORDS = 40
 

@@ -23,13 +23,14 @@ from sightray.integrators.notes import (
     note_ray,
     note_term,
 )  # fmt: skip
+from sightray.integrators.shading import first_step
 from sightray.lights.base import cells, illuminate
 from sightray.materials.base import BLINN, Local, local
 from sightray.mathlib.frame import reflect, refract
 from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_put, scratch, vec3_at, vec3_put
-from sightray.mathlib.vec import Vec3, dot, grey, max3, normalize, vabs, vexp
+from sightray.mathlib.vec import Vec3, dot, grey, max3, normalize, vexp
 from sightray.scene.world import AMBIENT as WORLD_AMBIENT
 from sightray.scene.world import BACKGROUND as WORLD_BACKGROUND
 from sightray.scene.world import Point, find_closest, is_blocked, light_at, light_count, point_of
@@ -101,7 +102,7 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Rad
         # Light the point where it is seen; light lost inside glass on the way dims all that follows.
         point = point_of(world, hit, o, d)
         terms = local(point.material, point.where, point.cos_view)
-        t_min = first_step(integrator, point.p, hit.t)
+        t_min = first_step(f64_at(integrator, OFFSET), point.p, hit.t)
         note_hit(number, hit.item, hit.t, point.p, point.shading)
         if max3(terms.absorption) > 0.0:
             left = vexp(terms.absorption * -hit.t)
@@ -140,15 +141,6 @@ def push(
     i64_put(top, KIND, kind)
     i64_put(top, PARENT, parent)
     return waiting + 1
-
-
-@kernel
-def first_step(integrator: Table, p: Vec3, t: f64) -> f64:
-    """Where secondary rays begin, so that they do not meet the surface they leave."""
-    stated = f64_at(integrator, OFFSET)
-    if stated == stated:
-        return stated
-    return 1e-9 * max(t, max3(vabs(p)))
 
 
 @kernel

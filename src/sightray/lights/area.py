@@ -55,3 +55,12 @@ def from_piece(p: Vec3, q: Vec3, normal: Vec3, radiant: Vec3, two_sided: bool) -
     if two_sided:
         cosine = abs(cosine)
     return LightSample(to_light, r, radiant * (max(cosine, 0.0) / r2))
+
+
+@kernel
+def flat_density(light: Table, normal: Vec3, area: f64, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    """Density per solid angle of a uniformly chosen point of a flat light: distance² / (cos area)."""
+    cosine = abs(dot(l, normal))
+    if i64_at(light, VISIBLE) == 0 or cosine <= 0.0:
+        return 0.0
+    return distance * distance / (cosine * area)

@@ -44,6 +44,20 @@ def illuminate(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
     raise NotImplementedError
 
 
+@method(2)
+def direction_density(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741 - the textbook's letter
+    """Density per solid angle with which `illuminate`, over all cells, chooses the direction `l` to a point of the light.
+
+    It is 0 for lights that no other ray can meet by chance: those without extent, and those that are not visible.
+    """
+    raise NotImplementedError
+
+
+@implements(direction_density, Light)
+def never_met(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    return 0.0
+
+
 @implements(cells, Light)
 def one_cell(light: Table) -> i64:
     return 1

@@ -9,8 +9,8 @@ import numpy as np
 
 from sightray._jit import implements, kernel
 from sightray.fields import Point, derived_vector, flag, number, vector
-from sightray.lights.area import GRID, RADIANCE, _AreaLight, from_piece, place_in_grid
-from sightray.lights.base import LightSample, illuminate
+from sightray.lights.area import GRID, RADIANCE, _AreaLight, flat_density, from_piece, place_in_grid
+from sightray.lights.base import LightSample, direction_density, illuminate
 from sightray.mathlib.axes import axes_across
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
@@ -79,3 +79,8 @@ def illuminate_from_disk(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> Li
     n, radius = i64_at(light, GRID), f64_at(light, RADIUS)
     radiant = vec3_at(light, RADIANCE) * (math.pi * radius * radius / (n * n))
     return from_piece(p, q, vec3_at(light, NORMAL), radiant, i64_at(light, TWO_SIDED) != 0)
+
+
+@implements(direction_density, DiskLight)
+def density_of_disk(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    return flat_density(light, vec3_at(light, NORMAL), math.pi * f64_at(light, RADIUS) ** 2.0, l, distance)

@@ -9,8 +9,8 @@ import numpy as np
 from sightray._jit import implements
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_number, derived_vector, flag, vector
-from sightray.lights.area import GRID, RADIANCE, _AreaLight, from_piece, place_in_grid
-from sightray.lights.base import LightSample, illuminate
+from sightray.lights.area import GRID, RADIANCE, _AreaLight, flat_density, from_piece, place_in_grid
+from sightray.lights.base import LightSample, direction_density, illuminate
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3
@@ -69,3 +69,8 @@ def illuminate_from_rectangle(light: Table, p: Vec3, cell: i64, u: f64, v: f64) 
     n = i64_at(light, GRID)
     radiant = vec3_at(light, RADIANCE) * (f64_at(light, AREA) / (n * n))
     return from_piece(p, q, vec3_at(light, NORMAL), radiant, i64_at(light, TWO_SIDED) != 0)
+
+
+@implements(direction_density, RectangleLight)
+def density_of_rectangle(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    return flat_density(light, vec3_at(light, NORMAL), f64_at(light, AREA), l, distance)

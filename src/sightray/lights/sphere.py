@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from sightray._jit import implements
+from sightray._jit import implements, kernel
 from sightray.fields import Point, number, vector
-from sightray.lights.area import GRID, RADIANCE, _AreaLight, place_in_grid
-from sightray.lights.base import LightSample, illuminate
+from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, place_in_grid
+from sightray.lights.base import LightSample, direction_density, illuminate
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
@@ -48,6 +48,13 @@ class SphereLight(_AreaLight):
 CENTER, RADIUS = SphereLight.offsets()[3:]
 
 
+@kernel
+def cap_of(radius: f64, d: f64) -> f64:
+    """1 - cos of the half-angle of the cone that a sphere fills from distance d."""
+    sin2 = (radius / d) * (radius / d)
+    return sin2 / (1.0 + math.sqrt(max(0.0, 1.0 - sin2)))
+
+
 @implements(illuminate, SphereLight)
 def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
     axis = vec3_at(light, CENTER) - p
@@ -58,8 +65,7 @@ def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> 
 
     # Choose a direction in the cone; 1 - cos is taken from the sine, which does not cancel for small lights.
     s = place_in_grid(light, cell, u, v)
-    sin2_max = (radius / d) * (radius / d)
-    cap = sin2_max / (1.0 + math.sqrt(max(0.0, 1.0 - sin2_max)))  # 1 - cos of the cone's half-angle
+    cap = cap_of(radius, d)
     height = s.x * cap  # 1 - cos of the direction
     sine = math.sqrt(max(0.0, height * (2.0 - height)))
     across = perpendicular(axis)
@@ -72,3 +78,11 @@ def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> 
     distance = d * (1.0 - height) - math.sqrt(max(0.0, foot2))
     n = i64_at(light, GRID)
     return LightSample(direction, distance, vec3_at(light, RADIANCE) * (2.0 * math.pi * cap / (n * n)))
+
+
+@implements(direction_density, SphereLight)
+def density_of_sphere(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    d, radius = length(vec3_at(light, CENTER) - p), f64_at(light, RADIUS)
+    if i64_at(light, VISIBLE) == 0 or not d > radius:
+        return 0.0
+    return 1.0 / (2.0 * math.pi * cap_of(radius, d))

@@ -1,7 +1,7 @@
 """The contract of materials.
 
-For Whitted's model (T. Whitted, "An improved illumination model for shaded display", CACM 1980) a material describes
-in `local` how its surface answers light at one point:
+There are two views of a surface. For Whitted's model (T. Whitted, "An improved illumination model for shaded display",
+CACM 1980) a material describes in `local` how its surface answers light at one point:
 
     I = emission + ambient * I_ambient + sum over lights of V * L * (diffuse * max(n.l, 0) + highlight)
         + mirror * I_reflected + transmission * I_refracted
@@ -9,16 +9,23 @@ in `local` how its surface answers light at one point:
 `diffuse` multiplies irradiance, so a Lambertian surface states albedo / pi. The highlight is
 ``specular * cos^shininess`` of the angle between the viewer and the mirrored light (Phong) or between the normal and
 the half vector (Blinn).
+
+For path tracing it answers by its bidirectional scattering distribution function f. Directions `wo` (to the viewer) and
+`wi` (to the light) are unit vectors that point away from the surface, in a frame whose z is the outward shading
+normal: z is negative inside. `bsdf` gives f times |cos wi| and the density with which `sample_bsdf` would choose wi;
+`sample_bsdf` chooses a direction with that density (per solid angle) and gives f |cos wi| / density. Mirrors and smooth
+glass have a value only in `sample_bsdf`, with density 0. `emitted` is the radiance towards the viewer, `interior` the
+absorption coefficient of the medium inside.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from sightray._jit import method
+from sightray._jit import implements, method
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table
-from sightray.mathlib.vec import Vec3
+from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 from sightray.textures.base import Where
 
@@ -41,11 +48,70 @@ class Local(NamedTuple):
     absorption: Vec3  # of the medium that the ray came through, per metre
 
 
+class BsdfSample(NamedTuple):
+    """A direction that light may have come from."""
+
+    wi: Vec3
+    weight: Vec3  # f(wo, wi) |cos wi| / density
+    density: f64  # per solid angle; 0 where the direction is the only one possible (mirrors, smooth glass)
+
+
+class BsdfValue(NamedTuple):
+    """What a surface makes of light from one direction."""
+
+    value: Vec3  # f(wo, wi) |cos wi|
+    density: f64  # with which `sample_bsdf` chooses wi, per solid angle
+
+
 class Material(Member, family="materials"):
-    """Base of all materials."""
+    """Base of all materials. Unless a member says otherwise it reflects, emits and absorbs nothing."""
 
 
 @method(0)
 def local(material: Table, where: Where, cos_view: f64) -> Local:
     """The surface's answer at a place. `cos_view`: viewer and outward normal; negative when seen from inside."""
     raise NotImplementedError
+
+
+@method(1)
+def sample_bsdf(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    """Choose a direction to go on in, by three uniform numbers."""
+    raise NotImplementedError
+
+
+@method(2)
+def bsdf(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValue:
+    """Value and density of a pair of directions."""
+    raise NotImplementedError
+
+
+@method(3)
+def emitted(material: Table, where: Where, cos_view: f64) -> Vec3:
+    """Radiance that the surface gives off towards the viewer."""
+    raise NotImplementedError
+
+
+@method(4)
+def interior(material: Table) -> Vec3:
+    """Absorption coefficient of what is inside, per metre."""
+    raise NotImplementedError
+
+
+@implements(sample_bsdf, Material)
+def sample_nothing(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    return BsdfSample(wo, grey(0.0), 0.0)
+
+
+@implements(bsdf, Material)
+def reflect_nothing(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValue:
+    return BsdfValue(grey(0.0), 0.0)
+
+
+@implements(emitted, Material)
+def emit_nothing(material: Table, where: Where, cos_view: f64) -> Vec3:
+    return grey(0.0)
+
+
+@implements(interior, Material)
+def absorb_nothing(material: Table) -> Vec3:
+    return grey(0.0)

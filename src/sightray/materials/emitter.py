@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sightray._jit import implements
 from sightray.fields import Color, color, flag
-from sightray.materials.base import PHONG, Local, Material, local
+from sightray.materials.base import PHONG, Local, Material, emitted, local
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, i64_at, vec3_at
-from sightray.mathlib.vec import grey
+from sightray.mathlib.vec import Vec3, grey
 from sightray.textures.base import Where
 
 
@@ -24,10 +24,14 @@ class Emitter(Material):
 RADIANCE, TWO_SIDED = Emitter.offsets()
 
 
+@implements(emitted, Emitter)
+def emitted_by_emitter(material: Table, where: Where, cos_view: f64) -> Vec3:
+    if cos_view > 0.0 or i64_at(material, TWO_SIDED) != 0:
+        return vec3_at(material, RADIANCE)
+    return grey(0.0)
+
+
 @implements(local, Emitter)
 def local_of_emitter(material: Table, where: Where, cos_view: f64) -> Local:
     zero = grey(0.0)
-    emission = zero
-    if cos_view > 0.0 or i64_at(material, TWO_SIDED) != 0:
-        emission = vec3_at(material, RADIANCE)
-    return Local(zero, emission, zero, zero, zero, 0.0, PHONG, zero, zero, 1.0, zero)
+    return Local(zero, emitted_by_emitter(material, where, cos_view), zero, zero, zero, 0.0, PHONG, zero, zero, 1.0, zero)

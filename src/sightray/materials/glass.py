@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from sightray._jit import implements
 from sightray.fields import Color, color, number
-from sightray.materials.base import PHONG, Local, Material, local
-from sightray.mathlib.frame import fresnel
+from sightray.materials.base import PHONG, BsdfSample, Local, Material, interior, local, sample_bsdf
+from sightray.mathlib.frame import fresnel, refract
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, vec3_at
-from sightray.mathlib.vec import grey
+from sightray.mathlib.vec import Vec3, grey
 from sightray.textures.base import Where
 
 
@@ -48,3 +50,18 @@ def local_of_glass(material: Table, where: Where, cos_view: f64) -> Local:
     tint = vec3_at(material, TINT)
     passed = tint * (1.0 - reflected)
     return Local(tint, zero, zero, zero, zero, 0.0, PHONG, grey(reflected), passed, eta, absorption)
+
+
+@implements(sample_bsdf, Glass)
+def sample_glass(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    """Reflect with the probability R, else refract; radiance is not scaled by eta² (that cancels on the way out)."""
+    eta = 1.0 / f64_at(material, IOR) if wo.z > 0.0 else f64_at(material, IOR)
+    if choice < fresnel(abs(wo.z), eta):
+        return BsdfSample(Vec3(-wo.x, -wo.y, wo.z), grey(1.0), 0.0)
+    facing = Vec3(0.0, 0.0, math.copysign(1.0, wo.z))
+    return BsdfSample(refract(-wo, facing, eta), vec3_at(material, TINT), 0.0)
+
+
+@implements(interior, Glass)
+def interior_of_glass(material: Table) -> Vec3:
+    return vec3_at(material, ABSORPTION)

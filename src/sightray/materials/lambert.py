@@ -7,10 +7,21 @@ from typing import Any
 
 from sightray._jit import implements
 from sightray.fields import Color, color
-from sightray.materials.base import PHONG, Local, Material, local
+from sightray.materials.base import (
+    PHONG,
+    BsdfSample,
+    BsdfValue,
+    Local,
+    Material,
+    bsdf,
+    emitted,
+    local,
+    sample_bsdf,
+)  # fmt: skip
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, table_at, vec3_at
-from sightray.mathlib.vec import grey
+from sightray.mathlib.vec import Vec3, grey
+from sightray.mathlib.warp import cosine_hemisphere
 from sightray.textures.base import Where, texture_value, textured
 
 
@@ -31,3 +42,25 @@ def local_of_lambert(material: Table, where: Where, cos_view: f64) -> Local:
     return Local(
         albedo, vec3_at(material, EMISSION), albedo, albedo * (1.0 / math.pi), zero, 0.0, PHONG, zero, zero, 1.0, zero
     )  # fmt: skip
+
+
+@implements(sample_bsdf, Lambert)
+def sample_lambert(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    wi = cosine_hemisphere(u, v)
+    density = wi.z / math.pi
+    if wo.z < 0.0:
+        wi = -wi
+    return BsdfSample(wi, texture_value(table_at(material, ALBEDO), where), density)
+
+
+@implements(bsdf, Lambert)
+def bsdf_of_lambert(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValue:
+    if wo.z * wi.z <= 0.0:
+        return BsdfValue(grey(0.0), 0.0)
+    density = abs(wi.z) / math.pi
+    return BsdfValue(texture_value(table_at(material, ALBEDO), where) * density, density)
+
+
+@implements(emitted, Lambert)
+def emitted_by_lambert(material: Table, where: Where, cos_view: f64) -> Vec3:
+    return vec3_at(material, EMISSION)

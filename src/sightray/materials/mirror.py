@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from sightray._jit import implements
-from sightray.materials.base import PHONG, Local, Material, local
+from sightray.materials.base import PHONG, BsdfSample, Local, Material, local, sample_bsdf
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, table_at
-from sightray.mathlib.vec import grey
+from sightray.mathlib.vec import Vec3, grey
 from sightray.textures.base import Where, texture_value, textured
 
 
@@ -29,3 +29,8 @@ def local_of_mirror(material: Table, where: Where, cos_view: f64) -> Local:
     zero = grey(0.0)
     reflectance = texture_value(table_at(material, REFLECTANCE), where)
     return Local(reflectance, zero, zero, zero, zero, 0.0, PHONG, reflectance, zero, 1.0, zero)
+
+
+@implements(sample_bsdf, Mirror)
+def sample_mirror(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    return BsdfSample(Vec3(-wo.x, -wo.y, wo.z), texture_value(table_at(material, REFLECTANCE), where), 0.0)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from sightray._jit import implements
+from sightray._jit import implements, kernel
 from sightray.fields import Color, choice, color, number
-from sightray.materials.base import Local, Material, local
+from sightray.materials.base import BsdfSample, BsdfValue, Local, Material, bsdf, emitted, local, sample_bsdf
+from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
-from sightray.mathlib.vec import grey
+from sightray.mathlib.vec import Vec3, cross, dot, grey, max3
+from sightray.mathlib.warp import cosine_hemisphere, power_cosine
 from sightray.textures.base import Where, texture_value, textured
 
 HIGHLIGHTS = ("phong", "blinn")  # at the indices PHONG and BLINN of the contract, because kernels see the index
@@ -25,6 +28,10 @@ class Phong(Material):
     with a the angle between the viewer and the mirrored light (``"phong"``), or between the normal and the half
     vector of viewer and light (``"blinn"``). So ``diffuse=0.5`` is as bright as a Lambertian albedo of 0.5 pi: nothing
     keeps the sum below 1, and colours may exceed it. `mirror` multiplies what a ray finds in the mirrored direction.
+
+    Path tracing takes the normalised model instead, which reflects no more than ``diffuse + specular + mirror``:
+    f = diffuse / pi + specular (n + 2) / (2 pi) max(r.wi, 0)^n, r the mirrored viewer (E. Lafortune, Y. Willems, 1994),
+    and the mirror.
 
     References
     ----------
@@ -58,3 +65,51 @@ def local_of_phong(material: Table, where: Where, cos_view: f64) -> Local:
         texture_value(table_at(material, MIRROR), where),
         grey(0.0), 1.0, grey(0.0),
     )  # fmt: skip
+
+
+@kernel
+def parts(material: Table, where: Where) -> Vec3:
+    """With which probability the diffuse part, the highlight and the mirror are sampled: by their largest channels."""
+    shares = Vec3(
+        max3(texture_value(table_at(material, DIFFUSE), where)),
+        max3(texture_value(table_at(material, SPECULAR), where)),
+        max3(texture_value(table_at(material, MIRROR), where)),
+    )
+    total = shares.x + shares.y + shares.z
+    return shares / total if total > 0.0 else Vec3(1.0, 0.0, 0.0)
+
+
+@implements(bsdf, Phong)
+def bsdf_of_phong(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValue:
+    if wo.z * wi.z <= 0.0:
+        return BsdfValue(grey(0.0), 0.0)
+    n, share = f64_at(material, SHININESS), parts(material, where)
+    lobe = max(0.0, dot(Vec3(-wo.x, -wo.y, wo.z), wi)) ** n / (2.0 * math.pi)
+    f = texture_value(table_at(material, DIFFUSE), where) * (1.0 / math.pi)
+    f += texture_value(table_at(material, SPECULAR), where) * ((n + 2.0) * lobe)
+    density = share.x * abs(wi.z) / math.pi + share.y * (n + 1.0) * lobe
+    return BsdfValue(f * abs(wi.z), density)
+
+
+@implements(sample_bsdf, Phong)
+def sample_phong(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    share = parts(material, where)
+    mirrored = Vec3(-wo.x, -wo.y, wo.z)
+    if choice < share.z:
+        return BsdfSample(mirrored, texture_value(table_at(material, MIRROR), where) / share.z, 0.0)
+    if choice < share.z + share.x:
+        wi = cosine_hemisphere(u, v)
+        wi = wi if wo.z > 0.0 else -wi
+    else:
+        across = perpendicular(mirrored)
+        local_wi = power_cosine(f64_at(material, SHININESS), u, v)
+        wi = across * local_wi.x + cross(mirrored, across) * local_wi.y + mirrored * local_wi.z
+    found = bsdf_of_phong(material, where, wo, wi)
+    if found.density <= 0.0:
+        return BsdfSample(wi, grey(0.0), 1.0)
+    return BsdfSample(wi, found.value / found.density, found.density)
+
+
+@implements(emitted, Phong)
+def emitted_by_phong(material: Table, where: Where, cos_view: f64) -> Vec3:
+    return vec3_at(material, EMISSION)

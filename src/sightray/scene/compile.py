@@ -111,12 +111,14 @@ class Compiled:
     def _pack_items(self, items: Table) -> tuple[np.ndarray, np.ndarray]:
         integers = items.view(np.int64)
         lower, upper = np.empty((2, len(self.items), 3))
+        lights = {index: number for number, index in enumerate(light_indices(self.scene))}
         for index, item in enumerate(self.items):
             start = index * item_row.ITEM_WORDS
             integers[start + item_row.SHAPE] = self.tables.row_of(item.shape).address
             integers[start + item_row.MATERIAL] = self.tables.row_of(item.material).address
             integers[start + item_row.MOVED] = not item.transform.is_identity
             integers[start + item_row.OBJECT] = item.object
+            integers[start + item_row.LIGHT] = lights.get(item.object, -1)
             put_columns(items, start + item_row.OBJECT_FROM_WORLD, item.transform.inverse)
             put_columns(items, start + item_row.WORLD_FROM_OBJECT, item.transform.matrix)
             lower[index], upper[index] = world_bounds(item)
@@ -167,6 +169,11 @@ def world_bounds(item: Item) -> tuple[np.ndarray, np.ndarray]:
     m = item.transform.matrix
     a, b = m[:3, :3] * lower, m[:3, :3] * upper
     return m[:3, 3] + np.minimum(a, b).sum(1), m[:3, 3] + np.maximum(a, b).sum(1)
+
+
+def light_indices(scene: Scene) -> list[int]:
+    """Where the lights stand among the scene's objects."""
+    return [index for index, thing in enumerate(scene.objects) if isinstance(thing, Light)]
 
 
 def require_camera(scene: Scene) -> Any:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.accelerators.base import blocked, closest
-from sightray.accelerators.item import MATERIAL, ItemHit, item_at, item_surface, to_object
+from sightray.accelerators.item import LIGHT, MATERIAL, ItemHit, item_at, item_surface, to_object
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, table_at
 from sightray.mathlib.vec import Vec3, dot, normalize
@@ -26,6 +26,7 @@ class Point(NamedTuple):
     cos_view: f64  # of the viewer and the shading normal; negative when seen from inside
     material: Table
     where: Where
+    light: i64  # number of the light whose surface this is, or -1
 
 
 @kernel
@@ -49,7 +50,8 @@ def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3) -> Point:
     s = item_surface(item, hit, p_object)
     shading = normalize(s.shading)
     return Point(
-        p, normalize(s.normal), shading, -dot(shading, d), table_at(item, MATERIAL), Where(s.u, s.v, p_object)
+        p, normalize(s.normal), shading, -dot(shading, d), table_at(item, MATERIAL), Where(s.u, s.v, p_object),
+        i64_at(item, LIGHT),
     )  # fmt: skip
 
 

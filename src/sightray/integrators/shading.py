@@ -1,0 +1,45 @@
+"""What integrators share: where secondary rays begin, and the frame of a shading point."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sightray._jit import kernel
+from sightray.mathlib.frame import perpendicular
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.vec import Vec3, cross, dot, max3, vabs
+
+
+class Frame(NamedTuple):
+    """Three unit vectors at right angles."""
+
+    s: Vec3
+    t: Vec3
+    n: Vec3
+
+
+@kernel
+def frame_about(n: Vec3) -> Frame:
+    """A frame whose third axis is the unit vector `n`."""
+    s = perpendicular(n)
+    return Frame(s, cross(n, s), n)
+
+
+@kernel
+def into(frame: Frame, v: Vec3) -> Vec3:
+    """A world vector in a frame."""
+    return Vec3(dot(frame.s, v), dot(frame.t, v), dot(frame.n, v))
+
+
+@kernel
+def out_of(frame: Frame, v: Vec3) -> Vec3:
+    """A vector of a frame in the world."""
+    return frame.s * v.x + frame.t * v.y + frame.n * v.z
+
+
+@kernel
+def first_step(stated: f64, p: Vec3, t: f64) -> f64:
+    """Where secondary rays begin, so that they do not meet the surface they leave; `stated` is NaN where it is not."""
+    if stated == stated:
+        return stated
+    return 1e-9 * max(t, max3(vabs(p)))

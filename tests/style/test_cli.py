@@ -76,6 +76,11 @@ def test_progress_bar_on_a_terminal(tmp_path):
     assert b"%" in shown
 
 
+def test_integrators_have_short_names(tmp_path):
+    result = sightray("render", "cornell", "--integrator", "path", "--width", 16, "--samples", 2, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+
+
 def test_explain(tmp_path):
     result = sightray("explain", "whitted", "--pixel", "20,30", "--width", 64)
     assert result.returncode == 0, result.stderr

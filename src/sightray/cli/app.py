@@ -14,7 +14,7 @@ app = typer.Typer(
 )  # fmt: skip
 
 SCENE = Annotated[str, typer.Argument(help="A built-in scene's name, or a file: .yaml .test .nff .obj .ply .stl .glb")]
-INTEGRATOR = Annotated[str | None, typer.Option(help="How light is computed, such as whitted.")]
+INTEGRATOR = Annotated[str | None, typer.Option(help="How light is computed: whitted, path, simplepath.")]
 SEED = Annotated[int, typer.Option(help="The same seed gives the same picture.")]
 WIDTH = Annotated[int | None, typer.Option(help="Pixels; the height follows unless given.")]
 HEIGHT = Annotated[int | None, typer.Option(help="Pixels; the width follows unless given.")]
@@ -112,10 +112,20 @@ def resized(scene: Any, width: int | None, height: int | None) -> Any:
 
 
 def named_integrator(name: str | None) -> Any:
-    """The integrator of that name, in any spelling of its case, with its default options."""
+    """The integrator of that class or module name, in any case, with its default options: ``path`` is `PathTracer`."""
     if name is None:
         return None
     from sightray.registry import find, members
 
-    spelled = {known.lower(): known for known in members("integrators")}
+    spelled = {}
+    for known, cls in members("integrators").items():
+        spelled[known.lower()] = spelled[cls.__module__.rsplit(".", 1)[-1]] = known
     return find("integrators", spelled.get(name.lower().replace("_", ""), name))()
+
+
+# Commands in files of their own, which use what stands above.
+from sightray.cli import bench as _bench  # noqa: E402
+from sightray.cli import heatmap as _heatmap  # noqa: E402
+
+app.add_typer(_bench.bench)
+app.command()(_heatmap.heatmap)

@@ -40,6 +40,7 @@ import threading
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator
+from contextvars import ContextVar
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -50,6 +51,17 @@ METHOD_SLOTS = 8  # words reserved for function pointers at the head of a row
 _PACKAGE = Path(__file__).parent
 _FAST_MATH = {"contract", "nsz"}  # fused multiply-add; never reassociation: results must not depend on the compiler
 _lock = threading.RLock()
+flavour: ContextVar[str] = ContextVar("flavour", default="")  # "counting": see mathlib.tally; each has its own code
+
+
+def _cache(function: Callable) -> Any:
+    """Remember results by argument and flavour."""
+
+    @functools.cache
+    def remembered(argument: Any, _: str) -> Any:
+        return function(argument)
+
+    return functools.wraps(function)(lambda argument: remembered(argument, flavour.get()))
 
 
 def enabled() -> bool:
@@ -249,7 +261,7 @@ def _linked(function: Callable) -> types.FunctionType:
     return copy
 
 
-@functools.cache
+@_cache
 def _dispatcher(function: Callable) -> Any:
     """The compiled Numba dispatcher of a kernel."""
     import numba
@@ -319,7 +331,7 @@ def _environment_digest() -> str:
 
 def _key(function: Callable) -> str:
     digest = hashlib.sha256(_environment_digest().encode())
-    digest.update(f"{function.__module__}.{function.__qualname__}".encode())
+    digest.update(f"{flavour.get()} {function.__module__}.{function.__qualname__}".encode())
     for callee in sorted(reachable(function), key=lambda f: (f.__module__, f.__qualname__)):
         code = getattr(callee, "__wrapped__", callee).__code__
         if not Path(code.co_filename).is_relative_to(_PACKAGE):
@@ -416,7 +428,7 @@ def _find_symbol(name: str) -> bool:
     return True
 
 
-@functools.cache
+@_cache
 def address(function: Callable) -> int:
     """Address of the machine code of a kernel; compiled only if the cache does not have it."""
     with _lock:
@@ -438,7 +450,7 @@ def is_compiled(function: Callable) -> bool:
     return path is not None and path.exists()
 
 
-@functools.cache
+@_cache
 def native(function: Callable) -> Callable:
     """A Python callable that runs a kernel as machine code without the GIL (or as Python where compiling is off).
 

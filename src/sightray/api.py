@@ -26,7 +26,7 @@ def render(
     filter: Member | None = None,
     adaptive: float | None = None,
     max_samples: int | None = None,
-    accelerator: Member | None = None,
+    accelerator: Member | str | None = None,
     progress: Callback | None = None,
     partial_ok: bool = False,
 ) -> Image:
@@ -42,7 +42,7 @@ def render(
     filter : reconstruction filter for more than one sample; by default `BoxFilter`.
     adaptive : contrast between neighbours (0 to 1) above which pixels get additional samples; None for none.
     max_samples : samples of those pixels; by default 4 times `samples`, and at least 9.
-    accelerator : structure that finds hits; by default `Bvh`.
+    accelerator : structure that finds hits, or its name such as "kdtree"; by default `Bvh`.
     progress : called about ten times a second with a `Progress`.
     partial_ok : return the unfinished picture on Ctrl-C instead of raising `KeyboardInterrupt`; its
         ``info["complete"]`` is then False.
@@ -57,6 +57,7 @@ def render(
     SceneError
         If the scene has no camera, or an option makes no sense.
     """
+    from sightray.accelerators.base import accelerator_named
     from sightray.engine.adaptive import where_neighbours_differ
     from sightray.engine.run import run
     from sightray.filters.box import BoxFilter
@@ -76,7 +77,7 @@ def render(
         refine = partial(where_neighbours_differ, threshold=adaptive, extra=most - samples)
     require_camera(scene)
     outcome = run(
-        compile_scene(scene, _member(accelerator, "accelerators", "accelerator")), integrator,
+        compile_scene(scene, _member(accelerator_named(accelerator), "accelerators", "accelerator")), integrator,
         _member(filter, "filters", "filter") or BoxFilter(),
         samples=samples, seed=seed, threads=threads, progress=progress, refine=refine,
     )  # fmt: skip

@@ -374,7 +374,9 @@ def trace_items(tree: Table, rays: Table, n: i64, t_min: f64, t_max: f64, t: Tab
 class _Captured:
     """Stands in for an accelerator and keeps what it is given."""
 
-    def build(self, space, items, lower, upper):
+    merges_meshes = False
+
+    def build_scene(self, space, items, lower, upper, things):
         self.items, self.lower, self.upper = items, lower, upper
         return space.row(8)
 

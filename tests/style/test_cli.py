@@ -113,6 +113,8 @@ def test_version():
         (["render", "whitted", "--samples", "0"], ["samples", "got 0"]),
         (["render", "whitted", "--integrator", "whited"], ["whited", "did you mean 'Whitted'"]),
         (["render", "whitted", "--adaptive", "7"], ["adaptive", "got 7"]),
+        (["render", "a.obj", "--limit", "max_triangles"], ["--limit", "max_triangles"]),
+        (["render", "a.obj", "--limit", "max_traingles=5"], ["max_traingles", "max_triangles"]),
         (["explain", "whitted", "--pixel", "1000,1000"], ["pixel", "(1000, 1000)"]),
         (["explain", "whitted", "--pixel", "middle"], ["--pixel", "middle"]),
     ],

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,15 +12,38 @@ from sightray.accelerators.item import ItemHit
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Space, Table
 from sightray.mathlib.vec import Vec3
-from sightray.registry import Member
+from sightray.registry import Member, find, members
 
 
 class Accelerator(Member, family="accelerators"):
     """Base of all accelerators over the items of a scene."""
 
+    merges_meshes: ClassVar[bool] = False  # whether small meshes are put together for it (see `scene.merge`)
+
     def build(self, space: Space, items: Table, lower: np.ndarray, upper: np.ndarray) -> Any:
-        """Row of the structure over items with these world bounds, each (n, 3) float64; unbounded ones are infinite."""
+        """Row of the structure over items with these world bounds, each (n, 3) float64.
+
+        Unbounded items have infinite bounds; items whose lower bounds exceed their upper ones are left out.
+        """
         raise NotImplementedError
+
+    def build_scene(
+        self, space: Space, items: Table, lower: np.ndarray, upper: np.ndarray, things: Sequence[Any]
+    ) -> Any:
+        """What the scene compiler calls: `build`, for structures that need no more than boxes.
+
+        Structures that look inside meshes override this one: `things` are the items as objects, in the same order,
+        with ``shape`` and ``transform``.
+        """
+        return self.build(space, items, lower, upper)
+
+
+def accelerator_named(value: Any) -> Any:
+    """The accelerator of a name, in any spelling of its case, with its default options; what is no name, as it is."""
+    if not isinstance(value, str):
+        return value
+    spelled = {known.lower(): known for known in members("accelerators")}
+    return find("accelerators", spelled.get(value.lower().replace("-", ""), value))()
 
 
 @method(0)

@@ -12,6 +12,7 @@ from sightray.accelerators.base import Accelerator, blocked, closest
 from sightray.accelerators.item import ItemHit, intersect_item, item_at, occluded_item
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Space, Table, i64_at, link, table_at
+from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.vec import Vec3
 
 ITEMS, COUNT = METHOD_SLOTS, METHOD_SLOTS + 1
@@ -32,6 +33,7 @@ def closest_of_all(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Ite
     items = table_at(tree, ITEMS)
     best = ItemHit(math.inf, -1, -1, 0.0, 0.0)
     for index in range(i64_at(tree, COUNT)):
+        tally(TESTS)
         hit = intersect_item(item_at(items, index), o, d, t_min, min(t_max, best.t))
         if hit.t < best.t:
             best = ItemHit(hit.t, index, hit.prim, hit.u, hit.v)

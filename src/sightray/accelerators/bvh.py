@@ -28,6 +28,7 @@ from sightray.bvh.bvh8 import (
 from sightray.mathlib.lanes import sort_key
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, i64_at, i64_put, link, scratch, table_at
+from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.vec import Vec3
 
 # The row of a tree over items, after the head that all trees have.
@@ -45,6 +46,8 @@ class Bvh(Accelerator):
     S. Boulos, "Getting rid of packets" (RT 2008).
     """
 
+    merges_meshes = True
+
     def build(self, space: Space, items: Table, lower: np.ndarray, upper: np.ndarray) -> Table:
         return pack_items(space, items, lower, upper)
 
@@ -52,7 +55,8 @@ class Bvh(Accelerator):
 def pack_items(space: Space, items: Table, lower: np.ndarray, upper: np.ndarray) -> Table:
     """The row of a tree over items with these bounds, each (n, 3) float64; those without bounds are infinite."""
     finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
-    bounded, unbounded = np.flatnonzero(finite).astype(np.int32), np.flatnonzero(~finite).astype(np.int32)
+    infinite = ~finite & (lower <= upper).all(axis=1)
+    bounded, unbounded = np.flatnonzero(finite).astype(np.int32), np.flatnonzero(infinite).astype(np.int32)
     # Bounds of moved shapes carry rounding errors of the size of their distance from the world's origin.
     error = 2.0**-48 * np.maximum(np.abs(lower[bounded]), np.abs(upper[bounded])).max(axis=1, initial=0.0)[:, None]
     tree = build(lower[bounded] - error, upper[bounded] + error, leaf_size=1)
@@ -98,6 +102,7 @@ def closest_item(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemH
 @kernel
 def nearer(tree: Table, index: i64, o: Vec3, d: Vec3, t_min: f64, t_max: f64, best: ItemHit) -> ItemHit:
     """The hit of an item if it is nearer than the best one so far, or else that one."""
+    tally(TESTS)
     hit = intersect_item(item_at(table_at(tree, ITEMS), index), o, d, t_min, min(t_max, best.t))
     return ItemHit(hit.t, index, hit.prim, hit.u, hit.v) if hit.t < best.t else best
 

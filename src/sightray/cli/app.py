@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+
+from sightray.cli.bench import bench
+from sightray.cli.common import HEIGHT, INTEGRATOR, LIMIT, SCENE, SEED, WIDTH, limits, named_integrator, resized
+from sightray.cli.heatmap import heatmap
 
 app = typer.Typer(
     help="Sightray follows rays of sight through scenes: pictures to look at and pictures to measure.",
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
 )  # fmt: skip
-
-SCENE = Annotated[str, typer.Argument(help="A built-in scene's name, or a file: .yaml .test .nff .obj .ply .stl .glb")]
-INTEGRATOR = Annotated[str | None, typer.Option(help="How light is computed: whitted, path, simplepath.")]
-SEED = Annotated[int, typer.Option(help="The same seed gives the same picture.")]
-WIDTH = Annotated[int | None, typer.Option(help="Pixels; the height follows unless given.")]
-HEIGHT = Annotated[int | None, typer.Option(help="Pixels; the width follows unless given.")]
+app.add_typer(bench)
+app.command()(heatmap)
 
 
 @app.command()
@@ -32,6 +32,7 @@ def render(
     seed: SEED = 0,
     width: WIDTH = None,
     height: HEIGHT = None,
+    limit: LIMIT = None,
     threads: Annotated[int | None, typer.Option(help="Default: one for every core.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
@@ -42,7 +43,7 @@ def render(
 
     path = output or Path(f"{Path(scene).stem}.png")
     check_writable(path)
-    loaded = resized(sr.load(scene), width, height)
+    loaded = resized(sr.load(scene, **limits(limit)), width, height)
     with showing_progress(quiet) as progress:
         image = sr.render(
             loaded, named_integrator(integrator), samples=samples, adaptive=adaptive, seed=seed, threads=threads,
@@ -65,6 +66,7 @@ def explain(
     seed: SEED = 0,
     width: WIDTH = None,
     height: HEIGHT = None,
+    limit: LIMIT = None,
 ) -> None:
     """Print the tree of rays behind one pixel, with numbers."""
     import sightray as sr
@@ -74,7 +76,7 @@ def explain(
         column, row = (int(part) for part in pixel.split(","))
     except ValueError:
         raise SceneError(f"--pixel: got '{pixel}'; allowed: COLUMN,ROW such as 320,240") from None
-    loaded = resized(sr.load(scene), width, height)
+    loaded = resized(sr.load(scene, **limits(limit)), width, height)
     print(sr.explain(loaded, pixel=(column, row), integrator=named_integrator(integrator), seed=seed))
 
 
@@ -95,37 +97,3 @@ def options(version: Annotated[bool, typer.Option("--version", help="Print the v
 
         print(f"sightray {metadata.version('sightray')}")
         raise typer.Exit
-
-
-def resized(scene: Any, width: int | None, height: int | None) -> Any:
-    """The scene with another picture size; the missing side follows the camera's proportions."""
-    if width is None and height is None:
-        return scene
-    from sightray.scene.compile import require_camera
-
-    camera = require_camera(scene)
-    if width is None:
-        width = max(1, round(height * camera.width / camera.height))
-    if height is None:
-        height = max(1, round(width * camera.height / camera.width))
-    return scene.replace(camera=camera.resized(width, height))
-
-
-def named_integrator(name: str | None) -> Any:
-    """The integrator of that class or module name, in any case, with its default options: ``path`` is `PathTracer`."""
-    if name is None:
-        return None
-    from sightray.registry import find, members
-
-    spelled = {}
-    for known, cls in members("integrators").items():
-        spelled[known.lower()] = spelled[cls.__module__.rsplit(".", 1)[-1]] = known
-    return find("integrators", spelled.get(name.lower().replace("_", ""), name))()
-
-
-# Commands in files of their own, which use what stands above.
-from sightray.cli import bench as _bench  # noqa: E402
-from sightray.cli import heatmap as _heatmap  # noqa: E402
-
-app.add_typer(_bench.bench)
-app.command()(_heatmap.heatmap)

@@ -14,10 +14,11 @@ from sightray.errors import SceneError
 from sightray.lights.base import Light
 from sightray.materials.lambert import Lambert
 from sightray.mathlib.table import Space, Table, aligned, link, set_methods
-from sightray.mathlib.transform import Transform, put_columns
+from sightray.mathlib.transform import IDENTITY, Transform, put_columns
 from sightray.registry import Member
 from sightray.scene import world as world_row
 from sightray.scene.instance import Group, Instance
+from sightray.scene.merge import merge_small_meshes
 from sightray.scene.scene import Scene
 from sightray.shapes.base import Shape
 
@@ -85,13 +86,14 @@ class Compiled:
         self.scene = scene
         self.tables = Tables()
         self.items = list(flatten(scene))
+        self.merged = merge_small_meshes(self.items) if accelerator.merges_meshes else None
         self.world = self._pack(accelerator)
 
     def _pack(self, accelerator: Any) -> Table:
         tables, scene, space = self.tables, self.scene, self.tables.space
-        items = space.array(aligned(max(1, len(self.items)) * item_row.ITEM_WORDS, np.float64))
+        items = space.array(aligned((len(self.items) + 1) * item_row.ITEM_WORDS, np.float64))
         lower, upper = self._pack_items(items)
-        tree = accelerator.build(space, items, lower, upper)
+        tree = accelerator.build_scene(space, items, lower, upper, self.items)
         tables.add(accelerator, tree)
         lights = space.row(max(1, len(scene.lights)))
         for index, light in enumerate(scene.lights):
@@ -100,6 +102,8 @@ class Compiled:
         link(world, world_row.TREE, tree)
         link(world, world_row.ITEMS, items)
         link(world, world_row.LIGHTS, lights)
+        world.view(np.int64)[world_row.MERGED] = world_row.NONE if self.merged is None else len(self.items)
+        link(world, world_row.ORIGIN, None if self.merged is None else space.array(self.merged.origin))
         world.view(np.int64)[world_row.LIGHT_COUNT] = len(scene.lights)
         if scene.camera is not None:
             link(world, world_row.CAMERA, tables.row_of(scene.camera))
@@ -109,10 +113,14 @@ class Compiled:
         return world
 
     def _pack_items(self, items: Table) -> tuple[np.ndarray, np.ndarray]:
+        """Fill the items' rows; their bounds, each (n, 3). Items that were merged have none, what they became has."""
         integers = items.view(np.int64)
-        lower, upper = np.empty((2, len(self.items), 3))
+        packed = list(self.items)
+        if self.merged is not None:
+            packed.append(Item(self.merged.mesh, DEFAULT_MATERIAL, IDENTITY, -1, ""))
+        lower, upper = np.empty((2, len(packed), 3))
         lights = {index: number for number, index in enumerate(light_indices(self.scene))}
-        for index, item in enumerate(self.items):
+        for index, item in enumerate(packed):
             start = index * item_row.ITEM_WORDS
             integers[start + item_row.SHAPE] = self.tables.row_of(item.shape).address
             integers[start + item_row.MATERIAL] = self.tables.row_of(item.material).address
@@ -122,6 +130,8 @@ class Compiled:
             put_columns(items, start + item_row.OBJECT_FROM_WORLD, item.transform.inverse)
             put_columns(items, start + item_row.WORLD_FROM_OBJECT, item.transform.matrix)
             lower[index], upper[index] = world_bounds(item)
+        if self.merged is not None:
+            lower[self.merged.members], upper[self.merged.members] = np.inf, -np.inf
         return lower, upper
 
 

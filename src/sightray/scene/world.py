@@ -7,14 +7,17 @@ from typing import NamedTuple
 from sightray._jit import kernel
 from sightray.accelerators.base import blocked, closest
 from sightray.accelerators.item import LIGHT, MATERIAL, ItemHit, item_at, item_surface, to_object
+from sightray.bvh.bvh8 import int_at
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, table_at
 from sightray.mathlib.vec import Vec3, dot, normalize
 from sightray.textures.base import Where
 
 TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4
+MERGED, ORIGIN = 5, 6  # item number of the small meshes put together, or NONE; whose triangles its triangles are
 BACKGROUND, AMBIENT = 8, 12
 WORLD_WORDS = 16
+NONE = -2
 
 
 class Point(NamedTuple):
@@ -32,7 +35,11 @@ class Point(NamedTuple):
 @kernel
 def find_closest(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemHit:
     """Nearest hit of a ray with the scene."""
-    return closest(table_at(world, TREE), o, d, t_min, t_max)
+    hit = closest(table_at(world, TREE), o, d, t_min, t_max)
+    if hit.item != i64_at(world, MERGED):
+        return hit
+    origin = table_at(world, ORIGIN)
+    return ItemHit(hit.t, int_at(origin, 2 * hit.prim), int_at(origin, 2 * hit.prim + 1), hit.u, hit.v)
 
 
 @kernel

@@ -17,7 +17,7 @@ from sightray.bvh.triangles import (
     pack_mesh,
 )
 from sightray.errors import SceneError
-from sightray.fields import Derived, Field, array
+from sightray.fields import REQUIRED, Derived, Field, array
 from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, i32_at, is_null, table_at
@@ -82,6 +82,15 @@ class Mesh(Shape):
             kept.flags.writeable = False
             object.__setattr__(self, "faces", kept)
             warnings.warn(f"Mesh: {self.dropped} triangles without area were dropped", stacklevel=4)
+
+    @classmethod
+    def joined(cls, vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+        """A mesh of triangles that are known to be good: nothing is checked or dropped, so their numbers stay."""
+        mesh = object.__new__(cls)
+        values = {name: field.convert(field.default) for name, field in cls.given.items() if field.default is not REQUIRED}
+        for name, value in {**values, "vertices": vertices, "faces": faces.astype(np.int32), "dropped": 0}.items():
+            object.__setattr__(mesh, name, value)
+        return mesh
 
     def tree(self) -> MeshTree:
         """The tree and the packed triangles, built on the first call."""

@@ -25,12 +25,12 @@ from sightray.accelerators.base import Accelerator
 from sightray.accelerators.item import MOVED, OBJECT_FROM_WORLD, ItemHit, intersect_item, item_at
 from sightray.accelerators.world_ray import WorldRay
 from sightray.bvh.triangles import axis_of, edge_functions, shear
+from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, aligned, f64_at, i32_at, i64_at, link, table_at
 from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.transform import transform_point, transform_vector
 from sightray.mathlib.vec import Vec3, dot
-from sightray.shapes.hit import Hit, miss
 from sightray.shapes.mesh import Mesh
 
 PAD = 2.0**-32

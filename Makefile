@@ -11,7 +11,7 @@ demo: $(VENV)/.installed
 	@echo "The picture is $(CURDIR)/demo.png"
 
 test: $(VENV)/.tested check
-	$(BIN)/python -m pytest -m "not slow" -n auto --dist worksteal
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-slow: $(VENV)/.tested
 	$(BIN)/python -m pytest -m slow

@@ -20,6 +20,7 @@ from sightray.shapes.disk import Disk
 from sightray.shapes.implicit import Implicit
 from sightray.shapes.mesh import Mesh
 from sightray.shapes.plane import Plane
+from sightray.shapes.point_cloud import PointCloud
 from sightray.shapes.polygon import Polygon
 from sightray.shapes.quadric import Quadric
 from sightray.shapes.rectangle import Rectangle
@@ -192,6 +193,45 @@ def kinked():
     return Example(shape, [Piece(g, in_box((-1, -1, -1), (1, 1, 1)))])
 
 
+def ball_of_points(n):
+    """Points on a slightly flattened sphere, by the golden angle, with its normals."""
+    height, angle = 1 - (2 * np.arange(n) + 1) / n, np.pi * (1 + 5**0.5) * np.arange(n)
+    around = np.sqrt(1 - height**2)
+    unit = np.stack([around * np.cos(angle), height, around * np.sin(angle)], axis=1)
+    normals = unit / (1, 0.8, 1)
+    return unit * (1, 0.8, 1), normals / norm(normals)[:, None]
+
+
+def smooth_cloud(n=60, radius=0.65):
+    points, normals = ball_of_points(n)
+
+    def squares(p):
+        return (p * p).sum(-1, keepdims=True) + (points * points).sum(-1) - 2 * p @ points.T
+
+    def chunk(p):
+        w = np.maximum(0, 1 - squares(p) / radius**2) ** 4
+        with np.errstate(invalid="ignore"):
+            return (w * (p @ normals.T - (points * normals).sum(-1))).sum(-1) / w.sum(-1)
+
+    def g(p):
+        parts = np.array_split(p.reshape(-1, 3), 1 + p.size // 30000)
+        return np.concatenate([chunk(part) for part in parts]).reshape(p.shape[:-1])
+
+    piece = Piece(g, lambda p: radius - np.sqrt(np.maximum(0, squares(p).min(axis=-1))))
+    return Example(PointCloud(points=points, normals=normals, radius=radius), [piece], closed=True, grazing=3e-2)
+
+
+def splat_cloud(n=24):
+    points, normals = ball_of_points(n)
+    radii = np.linspace(0.2, 0.3, n)
+
+    def disk(p0, n0, r):
+        return Piece(lambda p: (p - p0) @ n0, lambda p: r - norm(p - p0))
+
+    cloud = PointCloud(points=points, normals=3 * normals, radius=radii, surface="splats")
+    return Example(cloud, [disk(*each) for each in zip(points, normals, radii, strict=True)])
+
+
 C, N = np.array([0.4, -0.3, 0.2]), np.array([0.3, 0.8, -0.5])
 N1 = N / norm(N)
 LOWER, UPPER = (-0.5, -1, 0.2), (0.7, 0.6, 1)
@@ -226,4 +266,5 @@ EXAMPLES: dict[str, list[Example]] = {
               Example(Torus(minor_radius=0.02), torus_piece(0 * C, (0, 1, 0), 1, 0.02), True),
               Example(Torus(minor_radius=0.95), torus_piece(0 * C, (0, 1, 0), 1, 0.95), True)],
     "Implicit": [wavy_expression(), kinked(), user_function()],
+    "PointCloud": [smooth_cloud(), splat_cloud()],
 }  # fmt: skip

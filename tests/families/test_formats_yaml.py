@@ -50,6 +50,7 @@ def candidate(field):
 
 GIVEN = {
     "Mesh": {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1 / 3, 0]], "faces": [[0, 1, 2]], "uvs": [[0, 0], [1, 0], [0, 1]]},
+    "PointCloud": {"points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.1], [0.5, 0.5, 0]], "radius": 0.8},
     "Polygon": {"outline": [[0, 0, 0], [3, 0, 0], [0, 3, 0]], "holes": [[[0.1, 0.1, 0], [1, 0.1, 0], [0.1, 1, 0]]]},
     "Implicit": {"expression": "x**2 + y**2 + z**2 - 1", "function": None},
     "Bitmap": {"image": np.linspace(0, 1, 24).reshape(2, 4, 3), "scale": (2, 0.5), "offset": (0.25, 0)},

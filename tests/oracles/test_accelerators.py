@@ -121,7 +121,7 @@ def all_shapes():
 @every
 def test_all_shapes_instances_and_planes(all_shapes, accelerator):
     scene, rays = all_shapes
-    t, other = agree("zoo", scene, accelerator, rays)
+    t, other = agree("zoo", scene, accelerator, rays, t_min=1e-9)  # whether a ray meets its own origin is rounding
     assert 0.3 < np.isfinite(t).mean() < 1.0
     assert other.mean() < 0.03  # two of the meshes coincide
     agree("zoo near", scene, accelerator, rays[:600], t_min=0.5, t_max=2.0)

@@ -24,13 +24,13 @@ from sightray._jit import METHOD_SLOTS, kernel
 from sightray.accelerators.base import Accelerator
 from sightray.accelerators.item import MOVED, OBJECT_FROM_WORLD, ItemHit, intersect_item, item_at
 from sightray.accelerators.world_ray import WorldRay
-from sightray.bvh.triangles import axis_of, edge_functions, shear
+from sightray.bvh.triangles import axis_of, depth_of, edge_functions, shear, times
 from sightray.mathlib.hit import Hit, miss
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, aligned, f64_at, i32_at, i64_at, link, table_at
 from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.transform import transform_point, transform_vector
-from sightray.mathlib.vec import Vec3, dot
+from sightray.mathlib.vec import Vec3
 from sightray.shapes.mesh import Mesh
 
 PAD = 2.0**-32
@@ -145,11 +145,11 @@ def meet_face(vertices: Table, faces: Table, face: i64, o: Vec3, d: Vec3, t_min:
     z = Vec3(f64_at(vertices, a + s.kz), f64_at(vertices, b + s.kz), f64_at(vertices, c + s.kz)) - axis_of(o, s.kz)
     x = Vec3(f64_at(vertices, a + s.kx), f64_at(vertices, b + s.kx), f64_at(vertices, c + s.kx)) - axis_of(o, s.kx)
     y = Vec3(f64_at(vertices, a + s.ky), f64_at(vertices, b + s.ky), f64_at(vertices, c + s.ky)) - axis_of(o, s.ky)
-    e = edge_functions(x - z * s.sx, y - z * s.sy)
+    e = edge_functions(x - times(z, s.sx), y - times(z, s.sy))
     det = e.x + e.y + e.z
     if (min(e.x, e.y, e.z) < 0.0 and max(e.x, e.y, e.z) > 0.0) or det == 0.0:
         return miss()
-    t = dot(e, z) * s.sz / det
+    t = depth_of(e, z, s.sz, det)
     return Hit(t, face, e.y / det, e.z / det) if t_min < t < t_max else miss()
 
 

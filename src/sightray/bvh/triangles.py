@@ -71,7 +71,7 @@ from sightray.mathlib.table import (
     scratch,
     table_at,
 )
-from sightray.mathlib.vec import Vec3, dot
+from sightray.mathlib.vec import Vec3
 
 BLOCK_FLOATS, EDGES, INDICES = 48, 12, 36
 
@@ -274,18 +274,30 @@ def edge_functions(x: Vec3, y: Vec3) -> Vec3:
     return Vec3(x.z * y.y - y.z * x.y, x.x * y.z - y.x * x.z, x.y * y.x - y.y * x.x)
 
 
+@kernel(exact=True)
+def times(a: Vec3, factor: f64) -> Vec3:
+    """a * factor, rounded before anything is added: single rays and packets shall find the same to the last bit."""
+    return Vec3(a.x * factor, a.y * factor, a.z * factor)
+
+
+@kernel(exact=True)
+def depth_of(e: Vec3, z: Vec3, sz: f64, det: f64) -> f64:
+    """t of a hit from the edge functions and their sum."""
+    return (e.x * z.x + e.y * z.y + e.z * z.z) * sz / det
+
+
 @kernel
 def meet_triangle(mesh: Table, block: i64, lane: i64, o: Vec3, s: Shear, t_min: f64, t_max: f64) -> Hit:
     """The hit of the triangle in one lane of a block, decided in double precision (Woop, Benthin and Wald, 2013)."""
     vertices, blocks, at = table_at(mesh, VERTICES), table_at(mesh, BLOCKS), block * BLOCK_FLOATS + INDICES + lane
     z = corners(vertices, blocks, at, s.kz) - axis_of(o, s.kz)
-    x = corners(vertices, blocks, at, s.kx) - axis_of(o, s.kx) - z * s.sx
-    y = corners(vertices, blocks, at, s.ky) - axis_of(o, s.ky) - z * s.sy
+    x = corners(vertices, blocks, at, s.kx) - axis_of(o, s.kx) - times(z, s.sx)
+    y = corners(vertices, blocks, at, s.ky) - axis_of(o, s.ky) - times(z, s.sy)
     e = edge_functions(x, y)
     det = e.x + e.y + e.z
     if (min(e.x, e.y, e.z) < 0.0 and max(e.x, e.y, e.z) > 0.0) or det == 0.0:
         return miss()
-    t = dot(e, z) * s.sz / det
+    t = depth_of(e, z, s.sz, det)
     if t_min < t < t_max:
         return Hit(t, int_at(table_at(mesh, NUMBERS), 4 * block + lane), e.y / det, e.z / det)
     return miss()
@@ -315,9 +327,10 @@ def closest_triangle(mesh: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> H
             block = child & (LEAF - 1)
             maybe = filter_block(blocks, block * BLOCK_FLOATS, lanes, reach).maybe
             while maybe != 0:
-                hit = meet_triangle(mesh, block, lowest_bit(maybe), o, s, t_min, best.t)
+                hit = meet_triangle(mesh, block, lowest_bit(maybe), o, s, t_min, t_max)
                 maybe &= maybe - 1
-                if is_hit(hit):
+                # Of two triangles at the same place the one with the smaller number counts, whatever the order.
+                if hit.t < best.t or (hit.t == best.t and hit.prim < best.prim):
                     best = hit
                     reach = best.t * unit.speed - unit.start + unit.slack
     return best if best.prim >= 0 else miss()

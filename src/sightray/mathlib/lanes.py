@@ -1,8 +1,10 @@
-"""`F32x4` and `F32x8`: four or eight floats that one instruction handles together.
+"""`F32x4`, `F32x8`, `F32x16`, `F64x16`: numbers that one instruction handles together.
 
-The tree of boxes and the packed triangles are searched in single precision, eight boxes or four triangles at a time.
-This is a filter: whatever it lets through is decided in double precision. A comparison gives a `Mask4` or `Mask8`,
-which `movemask` turns into an integer with one bit a lane. Primitives carry their width in the name.
+The tree of boxes and the packed triangles are searched in single precision: eight boxes or four triangles for one ray, or
+sixteen rays for one box or triangle. This is a filter: whatever it lets through is decided in double precision, for
+sixteen rays in `F64x16`. A comparison gives a `Mask4`, `Mask8` or `Mask16`, which `movemask` turns into an integer with
+one bit a lane. Primitives carry their width in the name, those of doubles a `d`. Where the processor has no registers so
+wide, the compiler takes several.
 """
 
 from __future__ import annotations
@@ -39,15 +41,20 @@ class Mask8(Mask):
     """Eight truth values."""
 
 
+class Mask16(Mask):
+    """Sixteen truth values."""
+
+
 class Lanes:
-    """Floats with arithmetic and comparisons lane by lane; both sides have the same width."""
+    """Numbers with arithmetic and comparisons lane by lane; both sides have the same width."""
 
     __slots__ = ("values",)
     width: ClassVar[int]
     mask: ClassVar[type]
+    dtype: ClassVar[type] = np.float32
 
     def __init__(self, values: Any):
-        self.values = np.asarray(values, np.float32)
+        self.values = np.asarray(values, self.dtype)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.values.tolist()})"
@@ -60,6 +67,9 @@ class Lanes:
 
     def __mul__(self, other: Any) -> Any:
         return _quietly(np.multiply, self, other)
+
+    def __truediv__(self, other: Any) -> Any:
+        return _quietly(np.divide, self, other)
 
     def __lt__(self, other: Any) -> Any:
         return self.mask(self.values < other.values)
@@ -84,6 +94,18 @@ class F32x8(Lanes):
     """Eight floats."""
 
     width, mask = 8, Mask8
+
+
+class F32x16(Lanes):
+    """Sixteen floats."""
+
+    width, mask = 16, Mask16
+
+
+class F64x16(Lanes):
+    """Sixteen doubles."""
+
+    width, mask, dtype = 16, Mask16, np.float64
 
 
 def _quietly(operation: Any, a: Any, b: Any) -> Any:
@@ -112,6 +134,12 @@ def splat8(value: f64) -> F32x8:
 
 
 @primitive
+def splat16(value: f64) -> F32x16:
+    """One number, rounded to float, in all sixteen lanes."""
+    return F32x16(np.full(16, value, np.float32))
+
+
+@primitive
 def load4(table: Table, index: i64) -> F32x4:
     """Four floats from float number `index` of a table on."""
     return F32x4(table.view(np.float32)[index : index + 4].copy())
@@ -121,6 +149,12 @@ def load4(table: Table, index: i64) -> F32x4:
 def load8(table: Table, index: i64) -> F32x8:
     """Eight floats from float number `index` of a table on."""
     return F32x8(table.view(np.float32)[index : index + 8].copy())
+
+
+@primitive
+def load16(table: Table, index: i64) -> F32x16:
+    """Sixteen floats from float number `index` of a table on."""
+    return F32x16(table.view(np.float32)[index : index + 16].copy())
 
 
 @primitive
@@ -160,6 +194,12 @@ def vmin8(a: F32x8, b: F32x8) -> F32x8:
 
 
 @primitive
+def vmin16(a: F32x16, b: F32x16) -> F32x16:
+    """Smaller lane of each pair; the second where they cannot be compared."""
+    return _select(a.values < b.values, a, b)
+
+
+@primitive
 def vmax4(a: F32x4, b: F32x4) -> F32x4:
     """Larger lane of each pair; the second where they cannot be compared."""
     return _select(a.values > b.values, a, b)
@@ -172,9 +212,21 @@ def vmax8(a: F32x8, b: F32x8) -> F32x8:
 
 
 @primitive
+def vmax16(a: F32x16, b: F32x16) -> F32x16:
+    """Larger lane of each pair; the second where they cannot be compared."""
+    return _select(a.values > b.values, a, b)
+
+
+@primitive
 def flip4(a: F32x4, sign: F32x4) -> F32x4:
     """`a`, negated in the lanes where the sign bit of `sign` is set: ``flip4(a, a)`` is the absolute value."""
     return F32x4(np.where(np.signbit(sign.values), -a.values, a.values))
+
+
+@primitive
+def flip16(a: F32x16, sign: F32x16) -> F32x16:
+    """`a`, negated in the lanes where the sign bit of `sign` is set: ``flip16(a, a)`` is the absolute value."""
+    return F32x16(np.where(np.signbit(sign.values), -a.values, a.values))
 
 
 @primitive
@@ -196,6 +248,12 @@ def movemask8(mask: Mask8) -> i64:
 
 
 @primitive
+def movemask16(mask: Mask16) -> i64:
+    """Bit i is set where lane i is true."""
+    return _bits(mask)
+
+
+@primitive
 def lowest_bit(bits: i64) -> i64:
     """Number of the lowest bit that is set; `bits` is not zero."""
     return (bits & -bits).bit_length() - 1
@@ -205,3 +263,94 @@ def lowest_bit(bits: i64) -> i64:
 def sort_key(distance: f64) -> i64:
     """A key that sorts as `distance`, a number >= 0 that is rounded to float: its bits as the high half of 64."""
     return int(np.float32(distance).view(np.int32)) << 32
+
+
+@primitive
+def select16(choice: Mask16, a: F32x16, b: F32x16) -> F32x16:
+    """`a` where `choice` is true, else `b`."""
+    return _select(choice.bits, a, b)
+
+
+@primitive
+def least16(a: F32x16) -> f64:
+    """The smallest of sixteen floats, none of them NaN."""
+    return float(a.values.min())
+
+
+@primitive
+def mask16(bits: i64) -> Mask16:
+    """The lanes whose bits are set."""
+    return Mask16((bits >> np.arange(16)) & 1 != 0)
+
+
+@primitive
+def round16(a: F64x16) -> F32x16:
+    """Sixteen doubles rounded to floats."""
+    with np.errstate(all="ignore"):
+        return F32x16(a.values.astype(np.float32))
+
+
+@primitive
+def splat16d(value: f64) -> F64x16:
+    """One number in all sixteen lanes."""
+    return F64x16(np.full(16, value))
+
+
+@primitive
+def load16d(table: Table, index: i64) -> F64x16:
+    """Sixteen doubles from word `index` of a table on."""
+    return F64x16(table.view(np.float64)[index : index + 16].copy())
+
+
+@primitive
+def store16d(table: Table, index: i64, a: F64x16) -> None:
+    """Write sixteen doubles from word `index` of a table on."""
+    table.view(np.float64)[index : index + 16] = a.values
+
+
+@primitive
+def select16d(choice: Mask16, a: F64x16, b: F64x16) -> F64x16:
+    """`a` where `choice` is true, else `b`."""
+    return _select(choice.bits, a, b)
+
+
+@primitive
+def vmin16d(a: F64x16, b: F64x16) -> F64x16:
+    """Smaller lane of each pair; the second where they cannot be compared."""
+    return _select(a.values < b.values, a, b)
+
+
+@primitive
+def vmax16d(a: F64x16, b: F64x16) -> F64x16:
+    """Larger lane of each pair; the second where they cannot be compared."""
+    return _select(a.values > b.values, a, b)
+
+
+@primitive
+def abs16d(a: F64x16) -> F64x16:
+    """Absolute value of each lane."""
+    return F64x16(np.abs(a.values))
+
+
+@primitive
+def least16d(a: F64x16) -> f64:
+    """The smallest of sixteen doubles, none of them NaN."""
+    return float(a.values.min())
+
+
+@primitive
+def product16d(a: F64x16, b: F64x16) -> F64x16:
+    """a * b, rounded: never fused with a sum, so that ``product(a, b) - product(c, d)`` is antisymmetric."""
+    return _quietly(np.multiply, a, b)
+
+
+@primitive
+def transpose16(rows: Table, index: i64, target: Table, word: i64) -> None:
+    """Read sixteen rows of three floats from float number `index` on; write sixteen doubles x, y, z from `word` on."""
+    target.view(np.float64)[word : word + 48] = rows.view(np.float32)[index : index + 48].reshape(16, 3).T.reshape(-1)
+
+
+@primitive
+def transpose16d(rows: Table, index: i64, target: Table, word: i64) -> None:
+    """Read sixteen rows of three doubles from word `index` on; write sixteen x, y, z from `word` on."""
+    target.view(np.float64)[word : word + 48] = rows.view(np.float64)[index : index + 48].reshape(16, 3).T.reshape(-1)

@@ -20,11 +20,11 @@ FLAGS = ("contract", "nsz")
 
 
 class LanesType(types.Type):
-    """Numba's name for a number of float lanes."""
+    """Numba's name for a number of lanes of 32 or 64 bits."""
 
-    def __init__(self, width: int):
-        self.width = width
-        super().__init__(f"F32x{width}")
+    def __init__(self, width: int, bits: int = 32):
+        self.width, self.bits = width, bits
+        super().__init__(f"F{bits}x{width}")
 
 
 class MaskType(types.Type):
@@ -38,7 +38,7 @@ class MaskType(types.Type):
 @register_model(LanesType)
 class LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, ir.VectorType(F32, kind.width))
+        super().__init__(manager, kind, ir.VectorType(F32 if kind.bits == 32 else F64, kind.width))
 
 
 @register_model(MaskType)
@@ -48,7 +48,8 @@ class MaskModel(models.PrimitiveModel):
 
 
 TYPES = {
-    lanes.F32x4: LanesType(4), lanes.F32x8: LanesType(8), lanes.Mask4: MaskType(4), lanes.Mask8: MaskType(8),
+    lanes.F32x4: LanesType(4), lanes.F32x8: LanesType(8), lanes.F32x16: LanesType(16), lanes.F64x16: LanesType(16, 64),
+    lanes.Mask4: MaskType(4), lanes.Mask8: MaskType(8), lanes.Mask16: MaskType(16),
 }  # fmt: skip
 
 
@@ -73,7 +74,8 @@ def _comparison(sign: str) -> Any:
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
-for _symbol, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+for _symbol, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"),
+                              (operator.truediv, "fdiv")):  # fmt: skip
     _operator(_symbol, LanesType, False, _arithmetic(_instruction))
 for _symbol, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
     _operator(_symbol, LanesType, True, _comparison(_sign))
@@ -86,32 +88,57 @@ def _select(sign: str) -> Any:
     return lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, a, b), a, b)
 
 
-def _lower_width(width: int) -> None:
-    """The primitives that exist in every width."""
-    kind = ir.VectorType(F32, width)
+def _lower_width(width: int, scalar: Any, suffix: str, names: str) -> None:
+    """The primitives that exist in several widths: those among `names`."""
+    kind = ir.VectorType(scalar, width)
+    integer, size = (I32, 4) if scalar is F32 else (I64, 8)
+    integers = ir.VectorType(integer, width)
+    top = ir.Constant(integers, [-(1 << (8 * size - 1))] * width)
     anything = ir.Constant(kind, ir.Undefined)
     first = ir.Constant(ir.VectorType(I32, width), [0] * width)
+    kinds = f"v{width}f{8 * size}"
 
     def splat(builder: Any, value: Any) -> Any:
-        single = builder.insert_element(anything, builder.fptrunc(value, F32), I32(0))
+        value = builder.fptrunc(value, F32) if scalar is F32 else value
+        single = builder.insert_element(anything, value, I32(0))
         return builder.shuffle_vector(single, anything, first)
 
     def load(builder: Any, table: Any, index: Any) -> Any:
-        return builder.load(element(builder, table, index, kind, 4), align=4)
+        return builder.load(element(builder, table, index, kind, size), align=size)
 
     def store(builder: Any, table: Any, index: Any, a: Any) -> None:
-        builder.store(a, element(builder, table, index, kind, 4), align=4)
+        builder.store(a, element(builder, table, index, kind, size), align=size)
 
     def movemask(builder: Any, mask: Any) -> Any:
         return builder.zext(builder.bitcast(mask, ir.IntType(width)), I64)
 
-    for name, generate in (("splat", splat), ("load", load), ("store", store), ("movemask", movemask),
-                           ("vmin", _select("<")), ("vmax", _select(">"))):  # fmt: skip
-        lower(getattr(lanes, f"{name}{width}"))(generate)
+    def flip(builder: Any, a: Any, sign: Any) -> Any:
+        bits = builder.and_(builder.bitcast(sign, integers), top)
+        return builder.bitcast(builder.xor(builder.bitcast(a, integers), bits), kind)
+
+    def absolute(builder: Any, a: Any) -> Any:
+        return llvm_function(builder, f"llvm.fabs.{kinds}", kind, a)
+
+    def least(builder: Any, a: Any) -> Any:
+        function = ir.FunctionType(scalar, [kind])
+        name = f"llvm.vector.reduce.fmin.{kinds}"
+        reduce = builder.module.globals.get(name) or ir.Function(builder.module, function, name)
+        found = builder.call(reduce, [a], fastmath=("nnan",))
+        return builder.fpext(found, F64) if scalar is F32 else found
+
+    every: dict[str, Any] = {
+        "splat": splat, "load": load, "store": store, "movemask": movemask, "vmin": _select("<"), "vmax": _select(">"),
+        "flip": flip, "abs": absolute, "least": least, "select": lambda builder, c, a, b: builder.select(c, a, b),
+        "product": lambda builder, a, b: builder.fmul(a, b),
+    }  # fmt: skip
+    for name in names.split():
+        lower(getattr(lanes, f"{name}{width}{suffix}"))(every[name])
 
 
-_lower_width(4)
-_lower_width(8)
+_lower_width(4, F32, "", "splat load store movemask vmin vmax flip")
+_lower_width(8, F32, "", "splat load store movemask vmin vmax")
+_lower_width(16, F32, "", "splat load movemask vmin vmax flip least select")
+_lower_width(16, F64, "d", "splat load store vmin vmax abs least select product")
 
 
 def _half(first: int) -> Any:
@@ -124,12 +151,14 @@ lower(lanes.low4)(_half(0))
 lower(lanes.high4)(_half(4))
 
 
-@lower(lanes.flip4)
-def flip4(builder: Any, a: Any, sign: Any) -> Any:
-    integers = ir.VectorType(I32, 4)
-    top = ir.Constant(integers, [-(1 << 31)] * 4)
-    flip = builder.and_(builder.bitcast(sign, integers), top)
-    return builder.bitcast(builder.xor(builder.bitcast(a, integers), flip), a.type)
+@lower(lanes.mask16)
+def mask16(builder: Any, bits: Any) -> Any:
+    return builder.bitcast(builder.trunc(bits, ir.IntType(16)), ir.VectorType(I1, 16))
+
+
+@lower(lanes.round16)
+def round16(builder: Any, a: Any) -> Any:
+    return builder.fptrunc(a, ir.VectorType(F32, 16))
 
 
 @lower(lanes.extract4)
@@ -146,3 +175,22 @@ def lowest_bit(builder: Any, bits: Any) -> Any:
 def sort_key(builder: Any, distance: Any) -> Any:
     bits = builder.bitcast(builder.fptrunc(distance, F32), I32)
     return builder.shl(builder.sext(bits, I64), I64(32))
+
+
+def _transpose(scalar: Any, size: int) -> Any:
+    """Three rows of sixteen out of sixteen rows of three."""
+    kind, wide = ir.VectorType(scalar, 48), ir.VectorType(F64, 16)
+
+    def emit(builder: Any, rows: Any, index: Any, target: Any, word: Any) -> None:
+        values = builder.load(element(builder, rows, index, kind, size), align=size)
+        for axis in range(3):
+            chosen = ir.Constant(ir.VectorType(I32, 16), [3 * lane + axis for lane in range(16)])
+            column = builder.shuffle_vector(values, values, chosen)
+            column = builder.fpext(column, wide) if scalar is F32 else column
+            builder.store(column, element(builder, target, builder.add(word, I64(16 * axis)), wide, 8), align=8)
+
+    return emit
+
+
+lower(lanes.transpose16)(_transpose(F32, 4))
+lower(lanes.transpose16d)(_transpose(F64, 8))

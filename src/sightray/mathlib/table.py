@@ -90,12 +90,13 @@ def link(table: Table, word: int, target: Table | None) -> None:
 
 
 def set_methods(row: Table, functions: Iterable[tuple[int, Callable, int]]) -> None:
-    """Fill method slots of a row: (slot, Python function, address of its machine code)."""
+    """Fill method slots of a row: (slot, Python function, address of its machine code or 0)."""
     words = row.view(np.int64)
     for slot, function, address in functions:
         assert slot < METHOD_SLOTS
         row.functions[slot] = function
-        words[slot] = address
+        if address:  # plain Python has none, and must not take away what machine code uses
+            words[slot] = address
 
 
 @primitive

@@ -1,8 +1,9 @@
 """Small meshes put together into one, so that a ray walks one tree instead of one for each.
 
 A room of boxes and panels is a handful of meshes of two or twelve triangles; preparing a ray for each costs more than
-meeting them. Meshes with few triangles that appear once are therefore joined, in world coordinates, for the tree
-alone: what a hit reports, and how it is shaded, still belongs to the mesh that it came from.
+meeting them. Meshes with few triangles that stand in the world as they are, once, are therefore joined for the tree
+alone: what a hit reports, and how it is shaded, still belongs to the mesh that it came from. Moved ones are left alone,
+because vertices moved into the world would be rounded, and hits then not the same to the last digit.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def merge_small_meshes(items: Sequence[Any]) -> Merged | None:
     small = [
         index
         for index, item in enumerate(items)
-        if isinstance(item.shape, Mesh) and len(item.shape.faces) <= SMALL and shown[id(item.shape)] == 1
+        if shown[id(item.shape)] == 1 and item.transform.is_identity and len(item.shape.faces) <= SMALL
     ]
     total = np.cumsum([len(items[index].shape.faces) for index in small])
     small = small[: int(np.searchsorted(total, MOST, side="right"))]
@@ -41,8 +42,8 @@ def merge_small_meshes(items: Sequence[Any]) -> Merged | None:
         return None
     vertices, faces, origin, first = [], [], [], 0
     for index in small:
-        mesh, place = items[index].shape, items[index].transform
-        vertices.append(mesh.vertices if place.is_identity else place.point(mesh.vertices))
+        mesh = items[index].shape
+        vertices.append(mesh.vertices)
         faces.append(mesh.faces + first)
         origin.append(np.stack([np.full(len(mesh.faces), index), np.arange(len(mesh.faces))], axis=1))
         first += len(mesh.vertices)

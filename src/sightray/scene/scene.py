@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import TYPE_CHECKING, Any
 
 from sightray.errors import SceneError
 from sightray.fields import Color, child, choice, color, integer, other, text
@@ -10,6 +11,11 @@ from sightray.lights.base import Light
 from sightray.registry import Member
 from sightray.scene.instance import _Placed
 from sightray.shapes.base import Shape
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from sightray.scene.hits import ClosestPoints, Hits, Layers
 
 
 def _objects(values: Any) -> tuple[Any, ...]:
@@ -59,3 +65,96 @@ class Scene(Member, family="scene"):
 
     def __repr__(self) -> str:
         return f"<Scene {self.name or 'untitled'}: {len(self.objects)} objects, {len(self.lights)} of them lights>"
+
+    def intersect(self, origins: Any, directions: Any, t_max: Any = math.inf, *, t_min: float = 0.0,
+                  precision: str = "exact", threads: int | None = None) -> Hits:  # fmt: skip
+        """The nearest hit of each ray.
+
+        Parameters
+        ----------
+        origins, directions : (..., 3) arrays of floats or integers, world
+            Broadcast against one another; any strides. Directions need no unit length: a hit is at
+            origin + t * direction, with t in units of the direction as given.
+        t_max : number, or (...) array
+            Where rays end. Hits have t_min < t < t_max.
+        t_min : where rays begin.
+        precision : "exact" or "fast"
+            Hits are decided in double precision either way; "fast" gives leave not to, and is at present the same.
+        threads : at most so many; by default one for every core.
+
+        Returns
+        -------
+        Hits
+            Arrays of the broadcast shape. No ray at all, and therefore a miss (t infinite, shape -1), is what has an
+            origin or direction with NaN or infinity, a direction of length zero, or t_max <= t_min or NaN.
+
+        Raises
+        ------
+        SceneError
+            If an argument has another shape or type.
+        """
+        from sightray.scene.queries import intersect
+
+        return intersect(self, origins, directions, t_max, t_min, precision, threads)
+
+    def occluded(self, origins: Any, directions: Any, t_max: Any = math.inf, *, t_min: float = 0.0,
+                 precision: str = "exact", threads: int | None = None) -> np.ndarray:  # fmt: skip
+        """Whether each ray hits anything with t_min < t < t_max: (...) bool. Arguments as for `intersect`."""
+        from sightray.scene.queries import occluded
+
+        return occluded(self, origins, directions, t_max, t_min, precision, threads)
+
+    def intersect_all(self, origins: Any, directions: Any, t_max: Any = math.inf, *, t_min: float = 0.0,
+                      threads: int | None = None) -> Layers:  # fmt: skip
+        """Every surface along each ray, in order. Arguments as for `intersect`.
+
+        A ray through the edge or vertex of a mesh crosses it once, or not at all where it only touches.
+        """
+        from sightray.scene.queries import intersect_all
+
+        return intersect_all(self, origins, directions, t_max, t_min, threads)
+
+    def count(self, origins: Any, directions: Any, t_max: Any = math.inf, *, t_min: float = 0.0,
+              threads: int | None = None) -> np.ndarray:  # fmt: skip
+        """How many surfaces each ray crosses, the rows of `intersect_all`: (...) int64. Arguments as for `intersect`."""
+        from sightray.scene.queries import count
+
+        return count(self, origins, directions, t_max, t_min, threads)
+
+    def closest_point(self, points: Any, *, threads: int | None = None) -> ClosestPoints:
+        """The point of the scene's meshes that is nearest to each of `points`, (..., 3), world.
+
+        Raises
+        ------
+        UnsupportedError
+            If the scene shows a shape that is no mesh. Lights are left out.
+        """
+        from sightray.scene.closed import closest_point
+
+        return closest_point(self, points, threads)
+
+    def signed_distance(self, points: Any, *, threads: int | None = None) -> np.ndarray:
+        """Distance of each of `points`, (..., 3), to the scene's meshes, negative inside: (...) float64.
+
+        Infinite for points that are not finite. Raises as `contains` does.
+        """
+        from sightray.scene.closed import signed_distance
+
+        return signed_distance(self, points, threads)
+
+    def contains(self, points: Any, *, threads: int | None = None) -> np.ndarray:
+        """Whether each of `points`, (..., 3), is inside of the scene's meshes: (...) bool.
+
+        Inside is where surfaces wind around the point (not zero times): within any of several bodies, even where they
+        overlap, but not in a cavity whose normals point into it. A point on a surface, in rounding, may go either way.
+
+        Raises
+        ------
+        UnsupportedError
+            If the scene shows a shape that is no mesh. Lights are left out.
+        SceneError
+            If a mesh is not closed; the message says how many edges are open.
+        """
+        from sightray.scene.closed import contains
+
+        return contains(self, points, threads)

@@ -11,8 +11,8 @@ import sightray as sr
 from sightray.scenes._lettering import plate
 from sightray.scenes.teapot import teapot_mesh
 
-COLUMNS = 4
-PITCH_X, PITCH_Z = 2.4, 3.3
+COLUMNS = 5
+PITCH_X, PITCH_Z = 2.25, 3.3
 COLORS = (
     (0.8, 0.25, 0.15),
     (0.85, 0.6, 0.12),
@@ -28,6 +28,8 @@ def specimens() -> dict[str, Any]:
     star = [(math.sin(k * math.pi / 5) * r, 0.78 + math.cos(k * math.pi / 5) * r, 0.0)
             for k, r in enumerate([0.75, 0.32] * 5)]  # fmt: skip
     hole = [(0.17 * math.cos(a), 0.78 + 0.17 * math.sin(a), 0.0) for a in np.linspace(0, 2 * math.pi, 24)[:-1]]
+    z, a = 1 - (2 * np.arange(400) + 1) / 400, 2.399963 * np.arange(400)  # a spiral of even steps, by the golden angle
+    cloud = np.stack([np.sqrt(1 - z * z) * np.cos(a), z, np.sqrt(1 - z * z) * np.sin(a)], axis=1)
     lift, turn, size = sr.Transform.translate, sr.Transform.rotate, sr.Transform.scale
     return {
         "Sphere": sr.Sphere(center=(0, 0.7, 0), radius=0.7),
@@ -49,13 +51,14 @@ def specimens() -> dict[str, Any]:
             lower=(-1.3, -0.8, -1.2), upper=(1.3, 0.8, 1.3),
             transform=lift(0, 0.6, 0) @ size(0.58) @ turn((1, 0, 0), -90),
         ),
+        "PointCloud": sr.PointCloud(points=cloud * (0.6, 0.7, 0.6) + (0, 0.7, 0), surface="splats", radius=0.06),
     }  # fmt: skip
 
 
 def build() -> sr.Scene:
     floor = sr.Phong(diffuse=0.62, ambient=0.62, specular=0, mirror=0.08)
     things: list[Any] = [sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=floor, name="Plane")]
-    things.append(plate("Plane", (-2.4, 0.16, 7.9), 0.32))
+    things.append(plate("Plane", (3.3, 0.16, 6.65), 0.32))
     for index, (name, shape) in enumerate(specimens().items()):
         color = COLORS[index % len(COLORS)]
         x = (index % COLUMNS - (COLUMNS - 1) / 2) * PITCH_X

@@ -1,0 +1,85 @@
+"""Chunks of a batch on all cores: the calling thread takes part, others come from one pool for the process."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+
+import numpy as np
+
+from sightray.mathlib.table import Table, aligned
+
+FEW = 2048  # rays that are not worth waking a thread: a tenth of a millisecond
+CHUNK = 8192  # rays; a multiple of four, see `any_of_rays`
+POLL = 0.1  # seconds between looks at the keyboard
+
+_NEVER = Table(aligned(1, np.int64))  # the stop word of small batches
+_lock = threading.Lock()
+_pool: ThreadPoolExecutor | None = None
+_pool_size = 0
+
+
+def core_count() -> int:
+    """Cores that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _forget_pool() -> None:
+    global _lock, _pool, _pool_size
+    _lock, _pool, _pool_size = threading.Lock(), None, 0
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_pool)  # threads do not survive a fork
+
+
+def _start(helpers: int, work: Callable[[], None]) -> list[Future]:
+    global _pool, _pool_size
+    with _lock:
+        if _pool is None or _pool_size < helpers:
+            if _pool is not None:
+                _pool.shutdown(wait=False)
+            _pool, _pool_size = ThreadPoolExecutor(helpers, thread_name_prefix="sightray"), helpers
+        return [_pool.submit(work) for _ in range(helpers)]
+
+
+def run_chunks(n: int, work: Callable[[int, int, Table], None], threads: int | None = None, chunk: int = CHUNK) -> None:
+    """Call ``work(first, last, stop)`` for all chunks of n rays, on several threads.
+
+    On Ctrl-C, and when a chunk fails, the stop word is set: kernels look at it, no chunk is begun, and the exception is
+    raised when all threads have come to rest.
+    """
+    if n <= FEW:
+        if n > 0:
+            work(0, n, _NEVER)
+        return
+    stop = Table(aligned(1, np.int64))
+    chunks = -(-n // chunk)
+    helpers = min(core_count() if threads is None else threads, chunks) - 1
+    queue = itertools.count()
+    word = stop.view(np.int64)
+
+    def take() -> None:
+        try:
+            while word[0] == 0 and (first := chunk * next(queue)) < n:
+                work(first, min(first + chunk, n), stop)
+        except BaseException:
+            word[0] = 1
+            raise
+
+    running = _start(helpers, take) if helpers > 0 else []
+    try:
+        take()
+        while wait(running, POLL).not_done:
+            for future in running:
+                future.cancel()  # what has not begun finds nothing left to do
+    except BaseException:
+        word[0] = 1
+        wait(running)
+        raise
+    for future in running:
+        if not future.cancelled():
+            future.result()

@@ -315,3 +315,26 @@ def test_accelerators_by_name():
     assert accelerator_named(grid) is grid
     with pytest.raises(SceneError, match="unknown accelerator 'kdtre'"):
         accelerator_named("kdtre")
+
+
+@every
+def test_of_hits_at_the_same_place_the_lower_number_counts(accelerator):
+    """Shapes that lie in one another, and quads stated twice: the same one is seen whatever the structure."""
+    quad = {
+        "vertices": [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
+        "faces": [(0, 1, 2), (0, 2, 3), (0, 1, 2), (1, 2, 3)],
+    }
+    scene = sr.Scene(
+        sr.Sphere(center=(0, 0, -9)), sr.Rectangle(corner=(-1, -1, 0), edge_u=(2, 0, 0), edge_v=(0, 2, 0)),
+        sr.Rectangle(corner=(-1, -1, 0), edge_u=(2, 0, 0), edge_v=(0, 2, 0)), sr.Sphere(center=(3, 0, 0)),
+        sr.Sphere(center=(3, 0, 0)), sr.Instance(of=sr.Mesh(**quad), transform=sr.Transform.translate(0, 3, 0)),
+    )  # fmt: skip
+    rng = np.random.default_rng(4)
+    o = np.concatenate([rng.uniform(-0.99, 0.99, (300, 2)) + move for move in ((0, 0), (3, 0), (0, 3))])
+    rays = np.concatenate([o, np.full((900, 1), 5.0), np.tile([0.0, 0, -1], (900, 1))], axis=1)
+    _, hits = answers(scene, accelerator, rays)
+    _, expected = answers(scene, sr.Brute(), rays)
+    assert (hits == expected).all()
+    assert set(hits[:300, 0]) == {1}
+    assert set(hits[300:600, 0]) <= {3, -1}
+    assert 2 not in hits[600:, 1]  # a copy of triangle 0

@@ -9,7 +9,8 @@ import numpy as np
 
 from sightray._jit import METHOD_SLOTS, implements
 from sightray.accelerators.base import Accelerator, blocked, closest
-from sightray.accelerators.item import ItemHit, intersect_item, item_at, occluded_item
+from sightray.accelerators.item import ItemHit, better, intersect_item, item_at, occluded_item, worth
+from sightray.mathlib.hit import is_hit
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Space, Table, i64_at, link, table_at
 from sightray.mathlib.tally import TESTS, tally
@@ -34,9 +35,10 @@ def closest_of_all(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Ite
     best = ItemHit(math.inf, -1, -1, 0.0, 0.0)
     for index in range(i64_at(tree, COUNT)):
         tally(TESTS)
-        hit = intersect_item(item_at(items, index), o, d, t_min, min(t_max, best.t))
-        if hit.t < best.t:
-            best = ItemHit(hit.t, index, hit.prim, hit.u, hit.v)
+        hit = intersect_item(item_at(items, index), o, d, t_min, worth(best, t_max))
+        found = ItemHit(hit.t, index, hit.prim, hit.u, hit.v)
+        if is_hit(hit) and better(found, best):
+            best = found
     return best
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from sightray._jit import implements, kernel
 from sightray.accelerators.base import Accelerator, blocked, closest
-from sightray.accelerators.item import ItemHit, intersect_item, item_at, occluded_item
+from sightray.accelerators.item import ItemHit, better, intersect_item, item_at, occluded_item, worth
 from sightray.bvh.binned_sah import build, pack_tree
 from sightray.bvh.bvh8 import (
     CHILD,
@@ -25,6 +25,7 @@ from sightray.bvh.bvh8 import (
     push_children_unsorted,
     unit_ray,
 )
+from sightray.mathlib.hit import is_hit
 from sightray.mathlib.lanes import sort_key
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, i64_at, i64_put, link, scratch, table_at
@@ -103,8 +104,9 @@ def closest_item(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemH
 def nearer(tree: Table, index: i64, o: Vec3, d: Vec3, t_min: f64, t_max: f64, best: ItemHit) -> ItemHit:
     """The hit of an item if it is nearer than the best one so far, or else that one."""
     tally(TESTS)
-    hit = intersect_item(item_at(table_at(tree, ITEMS), index), o, d, t_min, min(t_max, best.t))
-    return ItemHit(hit.t, index, hit.prim, hit.u, hit.v) if hit.t < best.t else best
+    hit = intersect_item(item_at(table_at(tree, ITEMS), index), o, d, t_min, worth(best, t_max))
+    found = ItemHit(hit.t, index, hit.prim, hit.u, hit.v)
+    return found if is_hit(hit) and better(found, best) else best
 
 
 @implements(blocked, Bvh)

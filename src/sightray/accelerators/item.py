@@ -33,6 +33,20 @@ class ItemHit(NamedTuple):
 
 
 @kernel
+def better(hit: ItemHit, best: ItemHit) -> bool:
+    """Whether a hit is nearer; of two at the same place the lower item and primitive counts, whatever the order."""
+    if hit.t != best.t:
+        return hit.t < best.t
+    return hit.item < best.item or (hit.item == best.item and hit.prim < best.prim)
+
+
+@kernel
+def worth(best: ItemHit, t_max: f64) -> f64:
+    """Up to where a better hit may lie: just behind the best one so far, so that one at the same place is seen."""
+    return min(t_max, best.t * (1.0 + 2.0**-52))
+
+
+@kernel
 def item_at(items: Table, index: i64) -> Table:
     """Row of item number `index`."""
     return advance(items, index * ITEM_WORDS)

@@ -22,7 +22,15 @@ import numpy as np
 
 from sightray._jit import METHOD_SLOTS, kernel
 from sightray.accelerators.base import Accelerator
-from sightray.accelerators.item import MOVED, OBJECT_FROM_WORLD, ItemHit, intersect_item, item_at
+from sightray.accelerators.item import (
+    MOVED,
+    OBJECT_FROM_WORLD,
+    ItemHit,
+    better,
+    intersect_item,
+    item_at,
+    worth,
+)  # fmt: skip
 from sightray.accelerators.world_ray import WorldRay
 from sightray.bvh.triangles import axis_of, depth_of, edge_functions, shear, times
 from sightray.mathlib.hit import Hit, miss
@@ -175,8 +183,8 @@ def nearest_listed(
 ) -> ItemHit:
     """The nearest hit of the primitives in a range of a list if it is nearer than the best one so far, or that one."""
     for i in range(first, first + count):
-        hit = intersect_primitive(tree, number_at(numbers, i), ray.o, ray.d, t_min, min(t_max, best.t))
-        if hit.t < best.t:
+        hit = intersect_primitive(tree, number_at(numbers, i), ray.o, ray.d, t_min, worth(best, t_max))
+        if hit.item >= 0 and better(hit, best):
             best = hit
     return best
 

@@ -223,3 +223,18 @@ def test_mirrored_instance_keeps_its_outside():
     np.testing.assert_allclose(
         picture(flipped, light, integrator=one_sided), picture(plain, light, integrator=one_sided), rtol=1e-6, atol=1e-7
     )
+
+
+def test_outlines_of_coarse_smooth_meshes_are_not_dark():
+    """A bent sheet whose corner normals lean away from the viewer: lit from the viewer's side it must not turn black."""
+    lean = np.array([0.9, 0, -0.43])  # away from the viewer at +z, although the sheet faces him
+    sheet = sr.Mesh(
+        vertices=[(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], faces=[(0, 1, 2), (0, 2, 3)],
+        normals=[(0, 0, 1), lean, lean, (0, 0, 1)], material=sr.Lambert(albedo=0.8),
+    )  # fmt: skip
+    light = sr.DirectionalLight(direction=(-1, 0, -0.3), irradiance=2)
+    camera = sr.OrthographicCamera(eye=(0, 0, 5), target=(0, 0, 0), view_height=1.9, width=31, height=31)
+    for integrator in (sr.Whitted(), sr.PathTracer(max_depth=1)):
+        row = picture(sheet, light, camera=camera, integrator=integrator)[15, :, 0]
+        assert (np.diff(row) > -0.02).all()  # brighter and brighter towards the light
+        assert row[-1] > 0.4

@@ -63,7 +63,7 @@ def frame_mesh(objects: Sequence[Any], *, name: str = "", width: int = 640, heig
         DirectionalLight(direction=KEY, irradiance=(math.pi,) * 3),
         DirectionalLight(direction=FILL, irradiance=(0.2 * math.pi,) * 3),
         camera=PerspectiveCamera(eye=eye, target=center, vfov=VFOV, width=width, height=height),
-        background=0.3, ambient=0.15, name=name,
+        background=0.3, ambient=0.15, samples=9, name=name,
     )  # fmt: skip
 
 

@@ -15,7 +15,16 @@ from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, grey, max3, vexp
-from sightray.scene.world import BACKGROUND, Point, find_closest, is_blocked, light_at, light_count, point_of
+from sightray.scene.world import (
+    BACKGROUND,
+    Point,
+    find_closest,
+    is_blocked,
+    light_at,
+    light_count,
+    on_seen_side,
+    point_of,
+)
 
 
 class PathTracer(Integrator):
@@ -57,7 +66,7 @@ def path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radian
         if hit.item < 0:
             color += limited(integrator, beta * vec3_at(world, BACKGROUND), depth)
             break
-        point = point_of(world, hit, o, d)
+        point = on_seen_side(point_of(world, hit, o, d), d)
         if point.cos_view < 0.0:
             beta = beta * vexp(interior(point.material) * -hit.t)
         own_light = emitted(point.material, point.where, point.cos_view)

@@ -14,7 +14,7 @@ from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, i64_at, vec3_at
 from sightray.mathlib.vec import grey, max3, vexp
-from sightray.scene.world import BACKGROUND, find_closest, point_of
+from sightray.scene.world import BACKGROUND, find_closest, on_seen_side, point_of
 
 
 class SimplePathTracer(Integrator):
@@ -44,7 +44,7 @@ def simple_path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) ->
         if hit.item < 0:
             color += beta * vec3_at(world, BACKGROUND)
             break
-        point = point_of(world, hit, o, d)
+        point = on_seen_side(point_of(world, hit, o, d), d)
         if point.cos_view < 0.0:
             beta = beta * vexp(interior(point.material) * -hit.t)
         color += beta * emitted(point.material, point.where, point.cos_view)

@@ -33,7 +33,7 @@ from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_
 from sightray.mathlib.vec import Vec3, dot, grey, max3, normalize, vexp
 from sightray.scene.world import AMBIENT as WORLD_AMBIENT
 from sightray.scene.world import BACKGROUND as WORLD_BACKGROUND
-from sightray.scene.world import Point, find_closest, is_blocked, light_at, light_count, point_of
+from sightray.scene.world import Point, find_closest, is_blocked, light_at, light_count, on_seen_side, point_of
 
 MAX_DEPTH = 200
 
@@ -101,6 +101,8 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Rad
 
         # Light the point where it is seen; light lost inside glass on the way dims all that follows.
         point = point_of(world, hit, o, d)
+        if i64_at(integrator, TWO_SIDED) != 0:
+            point = on_seen_side(point, d)
         terms = local(point.material, point.where, point.cos_view)
         t_min = first_step(f64_at(integrator, OFFSET), point.p, hit.t)
         note_hit(number, hit.item, hit.t, point.p, point.shading)

@@ -54,7 +54,7 @@ class Lanes:
     dtype: ClassVar[type] = np.float32
 
     def __init__(self, values: Any):
-        self.values = np.asarray(values, self.dtype)
+        self.values: np.ndarray = np.asarray(values, self.dtype)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.values.tolist()})"
@@ -167,6 +167,12 @@ def store4(table: Table, index: i64, a: F32x4) -> None:
 def store8(table: Table, index: i64, a: F32x8) -> None:
     """Write eight floats from float number `index` of a table on."""
     table.view(np.float32)[index : index + 8] = a.values
+
+
+@primitive
+def store16(table: Table, index: i64, a: F32x16) -> None:
+    """Write sixteen floats from float number `index` of a table on."""
+    table.view(np.float32)[index : index + 16] = a.values
 
 
 @primitive
@@ -354,3 +360,20 @@ def transpose16(rows: Table, index: i64, target: Table, word: i64) -> None:
 def transpose16d(rows: Table, index: i64, target: Table, word: i64) -> None:
     """Read sixteen rows of three doubles from word `index` on; write sixteen x, y, z from `word` on."""
     target.view(np.float64)[word : word + 48] = rows.view(np.float64)[index : index + 48].reshape(16, 3).T.reshape(-1)
+
+
+@primitive
+def prefetch(table: Table, index: i64) -> None:
+    """Ask for the cache line of float number `index` of a table, which is soon to be read."""
+
+
+@primitive
+def put_ints16(table: Table, index: i64, a: F64x16) -> None:
+    """Write sixteen doubles as 32-bit integers from number `index` on; they are whole."""
+    table.view(np.int32)[index : index + 16] = a.values.astype(np.int32)
+
+
+@primitive
+def put_bytes16(table: Table, word: i64, mask: Mask16) -> None:
+    """Write one byte a lane, 0 or 1, from 64-bit word `word` on."""
+    table.view(np.uint8)[8 * word : 8 * word + 16] = mask.bits

@@ -137,7 +137,7 @@ def _lower_width(width: int, scalar: Any, suffix: str, names: str) -> None:
 
 _lower_width(4, F32, "", "splat load store movemask vmin vmax flip")
 _lower_width(8, F32, "", "splat load store movemask vmin vmax")
-_lower_width(16, F32, "", "splat load movemask vmin vmax flip least select")
+_lower_width(16, F32, "", "splat load store movemask vmin vmax flip least select")
 _lower_width(16, F64, "d", "splat load store vmin vmax abs least select product")
 
 
@@ -194,3 +194,24 @@ def _transpose(scalar: Any, size: int) -> Any:
 
 lower(lanes.transpose16)(_transpose(F32, 4))
 lower(lanes.transpose16d)(_transpose(F64, 8))
+
+
+@lower(lanes.prefetch)
+def prefetch(builder: Any, table: Any, index: Any) -> None:
+    place = builder.bitcast(element(builder, table, index, F32, 4), ir.IntType(8).as_pointer())
+    kind = ir.FunctionType(ir.VoidType(), [place.type, I32, I32, I32])
+    name = "llvm.prefetch.p0"
+    function = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
+    builder.call(function, [place, I32(0), I32(3), I32(1)])  # to read, into all caches, data
+
+
+@lower(lanes.put_ints16)
+def put_ints16(builder: Any, table: Any, index: Any, a: Any) -> None:
+    kind = ir.VectorType(I32, 16)
+    builder.store(builder.fptosi(a, kind), element(builder, table, index, kind, 4), align=4)
+
+
+@lower(lanes.put_bytes16)
+def put_bytes16(builder: Any, table: Any, word: Any, mask: Any) -> None:
+    kind = ir.VectorType(ir.IntType(8), 16)
+    builder.store(builder.zext(mask, kind), element(builder, table, word, kind, 8), align=1)

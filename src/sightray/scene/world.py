@@ -18,6 +18,7 @@ MERGED, ORIGIN = 5, 6  # item number of the small meshes put together, or NONE; 
 BACKGROUND, AMBIENT = 8, 12
 WORLD_WORDS = 16
 NONE = -2
+GRAZING = 1e-3  # cosine of the viewer and a shading normal that was bent
 
 
 class Point(NamedTuple):
@@ -59,6 +60,23 @@ def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3) -> Point:
     return Point(
         p, normalize(s.normal), shading, -dot(shading, d), table_at(item, MATERIAL), Where(s.u, s.v, p_object),
         i64_at(item, LIGHT),
+    )  # fmt: skip
+
+
+@kernel
+def on_seen_side(point: Point, d: Vec3) -> Point:
+    """The point with its shading normal bent just so far that it lies on the side of the surface that is seen.
+
+    Along the outline of a coarse mesh, interpolated normals turn away from the viewer before the surface does; taken
+    at their word they show the inside of the mesh.
+    """
+    facing = -dot(point.normal, d)
+    if facing * point.cos_view > 0.0:
+        return point
+    side = 1.0 if facing >= 0.0 else -1.0
+    shading = normalize(point.shading - d * (side * GRAZING - point.cos_view))
+    return Point(
+        point.p, point.normal, shading, -dot(shading, d), point.material, point.where, point.light
     )  # fmt: skip
 
 

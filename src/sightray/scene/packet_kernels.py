@@ -1,4 +1,4 @@
-"""Batches of rays sixteen at a time, for scenes of few items: `query_kernels` with packets (see `bvh.packets`).
+"""Batches of rays, 64 at a time in four packets, for scenes of few items: `query_kernels` with packets (see `bvh.packets`).
 
 Every item is asked in turn, so no tree over items is walked; up to `FEW_ITEMS` that is the faster way. Meshes are met by
 packets, other shapes ray by ray. Columns and forms are those of `query_kernels`.
@@ -18,10 +18,10 @@ from sightray.accelerators.item import (
     item_at,
     occluded_item,
 )
-from sightray.bvh.bundles import packet_vec3
+from sightray.bvh.bundles import lane_of, packet_vec3
 from sightray.bvh.bvh8 import int_at
-from sightray.bvh.casting import DIRECTION, END, ORIGIN, PRIM
-from sightray.bvh.packets import any_packet, closest_packet
+from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
+from sightray.bvh.packets import any_rays, closest_rays
 from sightray.mathlib.lanes import (
     load16d,
     mask16,
@@ -35,7 +35,7 @@ from sightray.mathlib.lanes import (
 )
 from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, f64_at, f64_put, i32_put, i64_at, scratch, table_at
+from sightray.mathlib.table import Table, advance, f64_at, f64_put, i32_put, i64_at, scratch, table_at
 from sightray.mathlib.transform import transform_point, transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.scene.crossings import MESH
@@ -44,8 +44,6 @@ from sightray.scene.world import ITEMS
 
 FEW_ITEMS = 4
 SINGLE_ROWS, DOUBLE_ROWS = 7, 6  # forms of contiguous (n, 3) arrays
-ITEM = 112 + 16  # words of a packet after those of `casting`: which item was met, and its object
-BATCH_OBJECT = ITEM + 16
 
 
 @kernel
@@ -85,38 +83,56 @@ def fill_packet(
 
 
 @kernel
-def move_packet(item: Table, packet: Table, moved: Table) -> None:
-    """A packet in the item's object space; t means the same there."""
-    for lane in range(16):
-        o = transform_point(item, OBJECT_FROM_WORLD, packet_vec3(packet, ORIGIN + lane))
-        d = transform_vector(item, OBJECT_FROM_WORLD, packet_vec3(packet, DIRECTION + lane))
-        put_lane(moved, ORIGIN, lane, o)
-        put_lane(moved, DIRECTION, lane, d)
-    store16d(moved, END, load16d(packet, END))
+def fill_packets(
+    origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table, e_form: i64, first: i64, n: i64,
+    packets: Table,
+) -> i64:  # fmt: skip
+    """Read the up to 64 rays from `first` on into packets; the number of these."""
+    count = (min(64, n - first) + 15) // 16
+    for p in range(count):
+        start = first + 16 * p
+        packet = advance(packets, p * PACKET_WORDS)
+        fill_packet(origins, o_form, directions, d_form, ends, e_form, start, min(16, n - start), packet)
+    return count
 
 
 @kernel
-def closest_of_item(item: Table, is_mesh: bool, packet: Table, moved: Table, t_min: f64) -> i64:
-    """The rays of a packet that meet an item before their end, which is brought there."""
+def move_packets(item: Table, packets: Table, count: i64, moved: Table) -> None:
+    """Packets in the item's object space; t means the same there."""
+    for p in range(count):
+        packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
+        for lane in range(16):
+            o = transform_point(item, OBJECT_FROM_WORLD, packet_vec3(packet, ORIGIN + lane))
+            d = transform_vector(item, OBJECT_FROM_WORLD, packet_vec3(packet, DIRECTION + lane))
+            put_lane(there, ORIGIN, lane, o)
+            put_lane(there, DIRECTION, lane, d)
+        store16d(there, END, load16d(packet, END))
+
+
+@kernel
+def closest_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
+    """The rays of packets that meet an item before their end, which is brought there."""
     if is_mesh and i64_at(item, MOVED) == 0:
-        return closest_packet(table_at(item, SHAPE), packet, t_min)
+        return closest_rays(table_at(item, SHAPE), packets, count, t_min)
     found = 0
     if is_mesh:
-        move_packet(item, packet, moved)
-        found = closest_packet(table_at(item, SHAPE), moved, t_min)
-        better = mask16(found)
-        store16d(packet, END, select16d(better, load16d(moved, END), load16d(packet, END)))
-        store16d(packet, PRIM, select16d(better, load16d(moved, PRIM), load16d(packet, PRIM)))
+        move_packets(item, packets, count, moved)
+        found = closest_rays(table_at(item, SHAPE), moved, count, t_min)
+        for p in range(count):
+            packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
+            better = mask16((found >> (16 * p)) & 0xFFFF)
+            store16d(packet, END, select16d(better, load16d(there, END), load16d(packet, END)))
+            store16d(packet, PRIM, select16d(better, load16d(there, PRIM), load16d(packet, PRIM)))
         return found
-    for lane in range(16):
-        o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
-        t_max = f64_at(packet, END + lane)
+    for k in range(16 * count):
+        at = lane_of(k)
+        o, d, t_max = packet_vec3(packets, ORIGIN + at), packet_vec3(packets, DIRECTION + at), f64_at(packets, END + at)
         if t_min < t_max and is_ray(o, d):
             hit = intersect_item(item, o, d, t_min, t_max)
             if hit.t < t_max:
-                f64_put(packet, END + lane, hit.t)
-                f64_put(packet, PRIM + lane, float(hit.prim))
-                found |= 1 << lane
+                f64_put(packets, END + at, hit.t)
+                f64_put(packets, PRIM + at, float(hit.prim))
+                found |= 1 << k
     return found
 
 
@@ -126,54 +142,61 @@ def closest_of_few(
     e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table,
 ) -> None:  # fmt: skip
     """The nearest hit of each ray: float64 t, and int32 item, object and primitive, -1 where there is none."""
-    packet, moved = scratch(160), scratch(128)
-    rows = table_at(world, ITEMS)
-    for first in range(0, n, 16):
+    packets, moved, item, thing = scratch(512), scratch(512), scratch(64), scratch(64)
+    rows, none = table_at(world, ITEMS), splat16d(-1.0)
+    for first in range(0, n, 64):
         if first & LOOK == 0 and i64_at(stop, 0) != 0:
             return
-        count, found = min(16, n - first), 0
-        fill_packet(origins, o_form, directions, d_form, ends, e_form, first, count, packet)
-        none = splat16d(-1.0)
-        store16d(packet, PRIM, none)
-        item, thing = none, none
+        count = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets)
+        for p in range(count):
+            store16d(packets, p * PACKET_WORDS + PRIM, none)
+            store16d(item, 16 * p, none)
+            store16d(thing, 16 * p, none)
+
+        # Each item brings the ends nearer of the rays that meet it.
+        found = 0
         for index in range(n_items):
             row = item_at(rows, index)
-            met = closest_of_item(row, int_at(kinds, index) == MESH, packet, moved, t_min)
-            if met != 0:
-                found |= met
-                item = select16d(mask16(met), splat16d(float(index)), item)
-                thing = select16d(mask16(met), splat16d(float(i64_at(row, OBJECT))), thing)
-        far = select16d(mask16(found), load16d(packet, END), splat16d(math.inf))
-        if count == 16:
-            store16d(t, first, far)
-            put_ints16(items, first, item)
-            put_ints16(objects, first, thing)
-            put_ints16(primitives, first, load16d(packet, PRIM))
-        else:
-            store16d(packet, END, far)
-            store16d(packet, ITEM, item)
-            store16d(packet, BATCH_OBJECT, thing)
-            for lane in range(count):
-                f64_put(t, first + lane, f64_at(packet, END + lane))
-                i32_put(items, first + lane, int(f64_at(packet, ITEM + lane)))
-                i32_put(objects, first + lane, int(f64_at(packet, BATCH_OBJECT + lane)))
-                i32_put(primitives, first + lane, int(f64_at(packet, PRIM + lane)))
+            met = closest_of_item(row, int_at(kinds, index) == MESH, packets, count, moved, t_min)
+            found |= met
+            for p in range(count):
+                these = mask16((met >> (16 * p)) & 0xFFFF)
+                store16d(item, 16 * p, select16d(these, splat16d(float(index)), load16d(item, 16 * p)))
+                number = splat16d(float(i64_at(row, OBJECT)))
+                store16d(thing, 16 * p, select16d(these, number, load16d(thing, 16 * p)))
+
+        # Write the answers: sixteen at a time, and the rest one by one.
+        for p in range(count):
+            start, packet = first + 16 * p, advance(packets, p * PACKET_WORDS)
+            met16 = mask16((found >> (16 * p)) & 0xFFFF)
+            store16d(packet, END, select16d(met16, load16d(packet, END), splat16d(math.inf)))
+            if start + 16 <= n:
+                store16d(t, start, load16d(packet, END))
+                put_ints16(items, start, load16d(item, 16 * p))
+                put_ints16(objects, start, load16d(thing, 16 * p))
+                put_ints16(primitives, start, load16d(packet, PRIM))
+            else:
+                for lane in range(n - start):
+                    f64_put(t, start + lane, f64_at(packet, END + lane))
+                    i32_put(items, start + lane, int(f64_at(item, 16 * p + lane)))
+                    i32_put(objects, start + lane, int(f64_at(thing, 16 * p + lane)))
+                    i32_put(primitives, start + lane, int(f64_at(packet, PRIM + lane)))
 
 
 @kernel
-def any_of_item(item: Table, is_mesh: bool, packet: Table, moved: Table, t_min: f64) -> i64:
-    """The rays of a packet that meet an item before their end."""
+def any_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
+    """The rays of packets that meet an item before their end."""
     if is_mesh and i64_at(item, MOVED) == 0:
-        return any_packet(table_at(item, SHAPE), packet, t_min)
+        return any_rays(table_at(item, SHAPE), packets, count, t_min)
     if is_mesh:
-        move_packet(item, packet, moved)
-        return any_packet(table_at(item, SHAPE), moved, t_min)
+        move_packets(item, packets, count, moved)
+        return any_rays(table_at(item, SHAPE), moved, count, t_min)
     found = 0
-    for lane in range(16):
-        o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
-        t_max = f64_at(packet, END + lane)
+    for k in range(16 * count):
+        at = lane_of(k)
+        o, d, t_max = packet_vec3(packets, ORIGIN + at), packet_vec3(packets, DIRECTION + at), f64_at(packets, END + at)
         if t_min < t_max and is_ray(o, d) and occluded_item(item, o, d, t_min, t_max):
-            found |= 1 << lane
+            found |= 1 << k
     return found
 
 
@@ -183,16 +206,17 @@ def any_of_few(
     e_form: i64, t_min: f64, n: i64, blocked: Table, stop: Table,
 ) -> None:  # fmt: skip
     """Whether each ray meets anything: one byte a ray; `blocked` is sixteen bytes longer than n."""
-    packet, moved = scratch(128), scratch(128)
+    packets, moved = scratch(512), scratch(512)
     rows = table_at(world, ITEMS)
-    for first in range(0, n, 16):
+    for first in range(0, n, 64):
         if first & LOOK == 0 and i64_at(stop, 0) != 0:
             return
-        count, found = min(16, n - first), 0
-        fill_packet(origins, o_form, directions, d_form, ends, e_form, first, count, packet)
+        count, found = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets), 0
         for index in range(n_items):
-            met = any_of_item(item_at(rows, index), int_at(kinds, index) == MESH, packet, moved, t_min)
-            if met != 0:  # who is blocked need not ask the next item
-                found |= met
-                store16d(packet, END, select16d(mask16(met), splat16d(math.nan), load16d(packet, END)))
-        put_bytes16(blocked, first >> 3, mask16(found))
+            met = any_of_item(item_at(rows, index), int_at(kinds, index) == MESH, packets, count, moved, t_min)
+            found |= met
+            for p in range(count):  # who is blocked need not ask the next item
+                end, these = load16d(packets, p * PACKET_WORDS + END), mask16((met >> (16 * p)) & 0xFFFF)
+                store16d(packets, p * PACKET_WORDS + END, select16d(these, splat16d(math.nan), end))
+        for p in range(count):
+            put_bytes16(blocked, (first >> 3) + 2 * p, mask16((found >> (16 * p)) & 0xFFFF))

@@ -92,7 +92,7 @@ def bundles(rng, n, width):
     return o, (aim + width * rng.normal(size=(n, 16, 3)) - o) * rng.uniform(0.1, 10.0, (n, 1, 1))
 
 
-@pytest.mark.parametrize("width", [0.0, 1e-4, 1e-2, 0.03, 0.3, 3.0])
+@pytest.mark.parametrize("width", [0.0, 1e-4, 1e-3, 5e-3, 0.03, 3.0])
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
 @pytest.mark.parametrize("offset", [0.0, 1e6])
 def test_packets_find_what_single_rays_find(width, scale, offset):
@@ -101,7 +101,7 @@ def test_packets_find_what_single_rays_find(width, scale, offset):
     o, d = bundles(rng, 1500, width)
     found, coherent = compare(row, o * scale + offset, d * scale)
     assert 0.1 < np.isfinite(found[..., 0]).mean() < 1.0
-    assert coherent > 0.5 if width <= 1e-2 else coherent < 0.9
+    assert coherent > 0.5 if width <= 1e-3 else coherent < 0.9
     ends = np.random.default_rng(2).uniform(0.0, 1.5, (1500, 16))
     compare(row, o * scale + offset, d * scale, ends, t_min=0.2)
 
@@ -111,7 +111,7 @@ def test_bundles_from_one_eye_through_edges_and_vertices():
     vertices, faces = ball(subdivisions=3)
     _space, row = packed(vertices, faces)
     corner = vertices[rng.integers(0, len(vertices), (3000, 1))]
-    near = corner + 0.02 * rng.normal(size=(3000, 16, 3))
+    near = corner + 0.004 * rng.normal(size=(3000, 16, 3))
     face = faces[rng.integers(0, len(faces), (3000, 8))]
     w = rng.integers(0, 3, (3000, 8, 1)) / 2.0
     near[:, :8] = vertices[face[..., 0]] * w + vertices[face[..., 1]] * (1 - w)  # elsewhere: not coherent
@@ -173,7 +173,7 @@ def test_axis_aligned_packets_on_a_grid(zero):
 def test_python_and_machine_code_agree():
     rng = np.random.default_rng(5)
     _space, row = packed(*ball(subdivisions=1))
-    o, d = bundles(rng, 12, 1e-2)
+    o, d = bundles(rng, 12, 1e-3)
     o[3, 2:9, 0], d[5, 3:, 1] = math.nan, 0.0
     slow, slow_coherent = compare(row, o, d, run=trace_both)
     fast, fast_coherent = compare(row, o, d)

@@ -1,9 +1,10 @@
-"""Sixteen rays that go different ways, in turns: while memory fetches a node for one, the others are at work.
+"""Up to 64 rays that go different ways, in turns: while memory fetches a node for one, the others are at work.
 
 A large tree does not fit into a processor's nearer caches, and rays in all directions wait for memory most of their time.
 Here every ray of a packet (see `packets`) has its own stack. It visits one node or block, asks for the memory that it will
-read next (`prefetch`), and the next ray has its turn. Rays are prepared sixteen at a time, and what they share with single
-rays is the same: boxes, filter, decision and order of children, so the hits are the same too.
+read next (`prefetch`), and the next ray has its turn. Rays that visit a node go first, those that visit a leaf follow:
+what differs from ray to ray is then not which code runs. Boxes, filter, decision and order of children are those of
+single rays, so the hits are the same. Four packets (see `casting`) go together, so that few rays are left alone at the end.
 
 Databases probe their trees like this: S. Chen, A. Ailamaki, P. Gibbons, T. Mowry, "Improving hash join performance
 through prefetching" (2004); O. Kocberber, B. Falsafi, B. Grot, "Asynchronous memory access chaining" (VLDB 2015).

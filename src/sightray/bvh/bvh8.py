@@ -39,6 +39,8 @@ from sightray.mathlib.lanes import (
 )
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i32_at, i64_at, i64_put, scratch, vec3_at
+from sightray.mathlib.tally import NODES as VISITS
+from sightray.mathlib.tally import tally
 from sightray.mathlib.vec import Vec3, grey, max3, vabs, vmax, vmin
 
 NODE_FLOATS, CHILDREN = 64, 48
@@ -132,6 +134,7 @@ class Met(NamedTuple):
 @kernel
 def meet_boxes(nodes: Table, node: i64, ray: BoxRay, reach: f64) -> Met:
     """Meet the eight boxes of a node with a ray, within `reach`."""
+    tally(VISITS)
     at = node * NODE_FLOATS
     near_x, far_x = load8(nodes, at + ray.x) * ray.rx - ray.nx, load8(nodes, at + 8 - ray.x) * ray.rx - ray.fx
     near_y, far_y = load8(nodes, at + ray.y) * ray.ry - ray.ny, load8(nodes, at + 40 - ray.y) * ray.ry - ray.fy

@@ -6,9 +6,10 @@ planes, at the one farthest behind for the far planes, with the smallest and the
 eight boxes, as for a single ray, tells which children no ray can meet; only the others are met by all sixteen rays. The
 nearest ray decides in which order. Other packets are left to `bundles`.
 
-Errors are those of `bvh8` (an interval ray is a ray with the same rounding) and of `triangles`: the same slack, lane by
-lane. What the filter lets through is decided in doubles for all sixteen rays, with the same operations in the same order
-as for a single ray: the hits are the same to the last bit.
+Errors are those of `bvh8` and of `triangles`: the same slack, lane by lane. An interval ray is a ray with one more rounding
+of its origin; boxes of triangles are found from rounded edges, 4u off: with the 8u of `bvh8` still less than 16u of slack.
+What the filter lets through is decided in doubles for all sixteen rays, with the same operations in the same order as for
+a single ray: the hits are the same to the last bit.
 
 References: I. Wald, P. Slusallek, C. Benthin, M. Wagner, "Interactive rendering with coherent ray tracing" (Eurographics
 2001); S. Boulos, I. Wald, P. Shirley, "Geometric and arithmetic culling methods for entire ray packets" (2006).
@@ -84,9 +85,9 @@ from sightray.mathlib.lanes import (
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f64_at, i64_at, i64_put, scratch, table_at
 
-SPREAD = (
-    0.1  # how far the rays of a packet may lie apart, in the tree's unit frame, at their origins and a unit further
-)
+# How far the origins of a packet's rays may lie apart, and their directions, in the tree's unit frame. Measured on half a
+# million triangles: wider packets are slower than rays in turns from 0.02 (any hit) to 0.05 (nearest) on.
+SPREAD = 0.02
 
 
 class IntervalRay(NamedTuple):

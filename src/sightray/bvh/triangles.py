@@ -71,6 +71,7 @@ from sightray.mathlib.table import (
     scratch,
     table_at,
 )
+from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.vec import Vec3
 
 BLOCK_FLOATS, EDGES, INDICES = 48, 12, 36
@@ -210,6 +211,7 @@ class Filtered(NamedTuple):
 @kernel
 def filter_block(blocks: Table, at: i64, ray: TriangleRay, reach: f64) -> Filtered:
     """Test the triangles of a block in single precision (Möller and Trumbore, 1997)."""
+    tally(TESTS)  # one for all four
     ax, ay, az = load4(blocks, at), load4(blocks, at + 4), load4(blocks, at + 8)
     bx, by, bz = load4(blocks, at + EDGES), load4(blocks, at + EDGES + 4), load4(blocks, at + EDGES + 8)
     cx, cy, cz = load4(blocks, at + 2 * EDGES), load4(blocks, at + 2 * EDGES + 4), load4(blocks, at + 2 * EDGES + 8)

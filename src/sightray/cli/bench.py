@@ -14,7 +14,18 @@ bench: typer.Typer = typer.Typer(name="bench", no_args_is_help=True, rich_markup
 
 @bench.callback()
 def measurements() -> None:
-    """Measure: structures over a scene."""
+    """Measure: rays each second, and structures over a scene."""
+
+
+@bench.command()
+def rays(
+    peers: Annotated[bool, typer.Option(help="Also those of Open3D, Mitsuba, embreex, trimesh that are installed.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Rays each second on half a million triangles, coherent and diffuse, nearest and any hit."""
+    from sightray.cli import bench_rays
+
+    bench_rays.rays(peers, as_json)
 
 
 @bench.command()

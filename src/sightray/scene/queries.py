@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from sightray.scene.compile import Compiled, compile_scene, world_bounds
 from sightray.scene.crossings import LAYER_WORDS, MESH, OTHER
 from sightray.scene.hits import Details, Hits, Layers
 from sightray.scene.layer_kernels import count_of_rays, layers_of_rays
+from sightray.scene.packet_kernels import FEW_ITEMS, any_of_few, closest_of_few
 from sightray.scene.parallel import run_chunks
 from sightray.scene.query_kernels import any_of_rays, closest_of_rays, describe_hits
 from sightray.scene.world import ITEMS
@@ -35,6 +37,7 @@ class Asked:
         kinds = np.array([MESH if isinstance(item.shape, Mesh) else OTHER for item in items] or [OTHER], np.int32)
         self.kinds = self.compiled.tables.space.array(kinds)
         self.objects = np.array([item.object for item in items], np.int32)
+        self.packets = 0 < len(items) <= FEW_ITEMS and MESH in kinds
         self._tree: Table | None = None
         self._kernels: dict[Callable, Callable] = {}
 
@@ -45,6 +48,18 @@ class Asked:
             self.compiled.tables.prepare(function)
             found = self._kernels[function] = native(function)
         return found
+
+    def closest(self) -> Callable:
+        """The kernel for the nearest hit, with its scene: by packets where a mesh is among few items."""
+        if self.packets:
+            return partial(self.kernel(closest_of_few), self.world, self.kinds, len(self.objects))
+        return partial(self.kernel(closest_of_rays), self.world)
+
+    def any(self) -> Callable:
+        """The kernel for any hit, with its scene."""
+        if self.packets:
+            return partial(self.kernel(any_of_few), self.world, self.kinds, len(self.objects))
+        return partial(self.kernel(any_of_rays), self.world)
 
     def tree(self) -> Table:
         """A tree over the items as they are: that of the world may have put small meshes together."""
@@ -98,7 +113,7 @@ def thread_option(verb: str, threads: Any) -> int | None:
 
 def intersect(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, precision: str, threads: Any) -> Hits:
     rays, ready = Rays("intersect", origins, directions, t_max, t_min, precision, threads), asked(scene)
-    n, run, world = rays.n, ready.kernel(closest_of_rays), ready.world
+    n, run = rays.n, ready.closest()
     block = np.empty((5, n), np.int32)  # one piece of memory is allocated, and found by kernels, faster than four
     t, item, shape, primitive = block[:2].reshape(-1).view(np.float64), block[2], block[3], block[4]
     start = Output(t)
@@ -106,7 +121,7 @@ def intersect(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any,
 
     def work(first: int, last: int, stop: Table) -> None:
         filled = [output.chunk(first, last) for output in outputs]
-        run(world, *rays.arguments(first, last), rays.t_min, last - first, *filled, stop)
+        run(*rays.arguments(first, last), rays.t_min, last - first, *filled, stop)
 
     run_chunks(n, work, rays.threads)
     answers = (t, shape, primitive, item)
@@ -133,14 +148,14 @@ def occluded(
     scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, precision: str, threads: Any
 ) -> np.ndarray:
     rays, ready = Rays("occluded", origins, directions, t_max, t_min, precision, threads), asked(scene)
-    run, world = ready.kernel(any_of_rays), ready.world
-    blocked = np.zeros(-(-rays.n // 4) * 4 + 4, np.uint8)  # kernels write four answers at a time
+    run = ready.any()
+    blocked = np.zeros(rays.n + 16, np.uint8)  # kernels write four or sixteen answers at a time
 
     output = Output(blocked)
 
     def work(first: int, last: int, stop: Table) -> None:
-        end = -(-last // 4) * 4
-        run(world, *rays.arguments(first, last), rays.t_min, last - first, output.chunk(first, end), stop)
+        end = -(-last // 16) * 16
+        run(*rays.arguments(first, last), rays.t_min, last - first, output.chunk(first, end), stop)
 
     run_chunks(rays.n, work, rays.threads)
     return blocked[: rays.n].view(np.bool_).reshape(rays.shape)

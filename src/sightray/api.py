@@ -55,14 +55,14 @@ def render(
     Raises
     ------
     SceneError
-        If the scene has no camera, or an option makes no sense.
+        If the scene has no camera or no shapes, or an option makes no sense.
     """
     from sightray.accelerators.base import accelerator_named
     from sightray.engine.adaptive import where_neighbours_differ
     from sightray.engine.run import run
     from sightray.filters.box import BoxFilter
     from sightray.integrators.whitted import Whitted
-    from sightray.scene.compile import compile_scene, require_camera
+    from sightray.scene.compile import compile_scene, require_view
 
     _expect(scene, Scene, "render", "scene")
     integrator = _member(integrator, "integrators", "integrator") or scene.integrator or Whitted()
@@ -75,7 +75,7 @@ def render(
             raise SceneError(f"render: adaptive: got {adaptive!r}; allowed: a contrast from 0 to 1, or None")
         most = max(9, 4 * samples) if max_samples is None else _whole("max_samples", max_samples, samples, 1 << 20)
         refine = partial(where_neighbours_differ, threshold=adaptive, extra=most - samples)
-    require_camera(scene)
+    require_view(scene)
     outcome = run(
         compile_scene(scene, _member(accelerator_named(accelerator), "accelerators", "accelerator")), integrator,
         _member(filter, "filters", "filter") or BoxFilter(),
@@ -143,9 +143,10 @@ def explain(scene: Scene, *, pixel: tuple[int, int], integrator: Member | None =
     """
     from sightray.engine.explain import explain_pixel
     from sightray.integrators.whitted import Whitted
-    from sightray.scene.compile import compile_scene
+    from sightray.scene.compile import compile_scene, require_view
 
     _expect(scene, Scene, "explain", "scene")
+    require_view(scene)
     try:
         column, row = (int(v) for v in pixel)
     except (TypeError, ValueError):

@@ -136,6 +136,11 @@ def test_errors_in_files_name_file_and_line(tmp_path):
     assert "a.test:3:" in refused("render", course)
 
 
+def test_an_empty_scene_is_a_mistake(tmp_path):
+    (tmp_path / "empty.test").write_text("size 4 4\ncamera 0 0 4 0 0 0 0 1 0 30\n")
+    assert "no shapes" in refused("render", "empty.test", cwd=tmp_path)
+
+
 def test_unwritable_output_is_found_before_rendering(tmp_path):
     kept = tmp_path / "kept.png"
     kept.write_bytes(b"old")

@@ -85,8 +85,9 @@ def scenes() -> None:
     """List the built-in scenes."""
     from sightray import scenes as built_in
 
+    width = max(map(len, built_in.names()))
     for name in built_in.names():
-        print(f"{name:18} {built_in.summary(name)}")
+        print(f"{name:{width}}  {built_in.summary(name)}")
 
 
 @app.callback(invoke_without_command=True)

@@ -186,6 +186,13 @@ def light_indices(scene: Scene) -> list[int]:
     return [index for index, thing in enumerate(scene.objects) if isinstance(thing, Light)]
 
 
+def require_view(scene: Scene) -> Any:
+    """The scene's camera, or a `SceneError` if it has none or there is nothing to see."""
+    if next(flatten(scene), None) is None:
+        raise SceneError("Scene.objects: no shapes; a picture needs at least one, such as Sphere(radius=1)")
+    return require_camera(scene)
+
+
 def require_camera(scene: Scene) -> Any:
     """The scene's camera, or a `SceneError`."""
     if scene.camera is None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-import typing
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -160,8 +159,3 @@ def _discover(family: str) -> None:
     for module in pkgutil.iter_modules(package.__path__):
         if not module.name.endswith("_llvm"):
             importlib.import_module(f"sightray.{family}.{module.name}")
-
-
-def annotations_of(cls: type[Member]) -> dict[str, Any]:
-    """Type annotations of a member's fields, for the docs."""
-    return typing.get_type_hints(cls)

@@ -27,12 +27,26 @@ _NOUNS = {
     "Group": "sightray.scene.instance",
     "Instance": "sightray.scene.instance",
     "Progress": "sightray.engine.progress",
+    "Spectrum": "sightray.spectra",
+    "RefractiveIndex": "sightray.spectra",
+    "ComplexIndex": "sightray.spectra",
     "SightrayError": "sightray.errors",
     "SceneError": "sightray.errors",
     "FormatError": "sightray.errors",
     "UnsupportedError": "sightray.errors",
 }
-_PUBLIC_FAMILIES = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters", "accelerators")
+_PUBLIC_FAMILIES = (
+    "shapes",
+    "materials",
+    "textures",
+    "lights",
+    "cameras",
+    "integrators",
+    "filters",
+    "samplers",
+    "media",
+    "accelerators",
+)
 
 
 def __getattr__(name: str) -> Any:
@@ -43,6 +57,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(importlib.import_module("sightray.api"), name)
     elif name in _NOUNS:
         value = getattr(importlib.import_module(_NOUNS[name]), name)
+    elif name == "spectra":
+        value = importlib.import_module("sightray.spectra")
     elif name[0].isupper():
         value = _member(name)
     else:
@@ -65,4 +81,4 @@ def _member(name: str) -> Any:
 def __dir__() -> list[str]:
     from sightray.registry import members
 
-    return sorted({*_VERBS, *_NOUNS, *(name for family in _PUBLIC_FAMILIES for name in members(family))})
+    return sorted({*_VERBS, *_NOUNS, "spectra", *(name for family in _PUBLIC_FAMILIES for name in members(family))})

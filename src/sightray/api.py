@@ -23,6 +23,7 @@ def render(
     samples: int | None = None,
     seed: int = 0,
     threads: int | None = None,
+    sampler: Member | None = None,
     filter: Member | None = None,
     adaptive: float | None = None,
     max_samples: int | None = None,
@@ -39,6 +40,7 @@ def render(
     samples : rays of sight per pixel; by default the scene's. A single one goes through the pixel's centre.
     seed : names the random numbers: the same seed gives the same picture, whatever the number of threads.
     threads : by default one for every core.
+    sampler : where samples fall; by default `IndependentSampler`.
     filter : reconstruction filter for more than one sample; by default `BoxFilter`.
     adaptive : contrast between neighbours (0 to 1) above which pixels get additional samples; None for none.
     max_samples : samples of those pixels; by default 4 times `samples`, and at least 9.
@@ -62,6 +64,7 @@ def render(
     from sightray.engine.run import run
     from sightray.filters.box import BoxFilter
     from sightray.integrators.whitted import Whitted
+    from sightray.samplers.base import default_sampler
     from sightray.scene.compile import compile_scene, require_view
 
     _expect(scene, Scene, "render", "scene")
@@ -78,7 +81,7 @@ def render(
     require_view(scene)
     outcome = run(
         compile_scene(scene, _member(accelerator_named(accelerator), "accelerators", "accelerator")), integrator,
-        _member(filter, "filters", "filter") or BoxFilter(),
+        _member(sampler, "samplers", "sampler") or default_sampler(), _member(filter, "filters", "filter") or BoxFilter(),
         samples=samples, seed=seed, threads=threads, progress=progress, refine=refine,
     )  # fmt: skip
     if not outcome.complete and not partial_ok:

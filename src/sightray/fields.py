@@ -332,6 +332,11 @@ def derived_array(doc: str, compute: Callable[[Any], np.ndarray | None]) -> Any:
     return Derived(doc, compute, Array)
 
 
+def derived_child(doc: str, compute: Callable[[Any], Any]) -> Any:
+    """A member, or None, that is computed from the other fields when the row is packed."""
+    return Derived(doc, compute, Child)
+
+
 # The names that classes use: they return the field but are typed as the value, for constructors to read well.
 def number(doc: str, default: Any = REQUIRED, **options: Any) -> Any:
     """A finite number, with optional bounds ``above at_least below at_most``."""

@@ -26,7 +26,19 @@ else:
         return lambda cls: cls
 
 
-FAMILIES = ("shapes", "materials", "textures", "lights", "cameras", "integrators", "filters", "scene", "accelerators")
+FAMILIES = (
+    "shapes",
+    "materials",
+    "textures",
+    "lights",
+    "cameras",
+    "integrators",
+    "filters",
+    "samplers",
+    "media",
+    "scene",
+    "accelerators",
+)
 _members: dict[str, dict[str, type[Member]]] = {name: {} for name in FAMILIES}
 
 

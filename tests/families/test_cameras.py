@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sightray._jit import kernel, native
-from sightray.cameras.base import generate_ray
+from sightray.cameras.base import sight_ray
 from sightray.cameras.orthographic import OrthographicCamera
 from sightray.cameras.perspective import PerspectiveCamera
 from sightray.cameras.pinhole import PinholeCamera
@@ -36,9 +36,9 @@ EVERY = [pytest.param(c, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() 
 
 @kernel
 def ask(camera: Table, count: i64, pixels: Table, rays: Table) -> i64:
-    """`generate_ray` for many pixels."""
+    """`sight_ray` for many pixels."""
     for i in range(count):
-        ray = generate_ray(camera, f64_at(pixels, 2 * i), f64_at(pixels, 2 * i + 1))
+        ray = sight_ray(camera, f64_at(pixels, 2 * i), f64_at(pixels, 2 * i + 1), 0.5, 0.5, 0.5)
         vec3_put(rays, 8 * i, ray.origin)
         vec3_put(rays, 8 * i + 4, ray.direction)
     return count

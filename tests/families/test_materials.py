@@ -19,7 +19,7 @@ from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put, i64_put, vec3_at, vec3_put
 from sightray.registry import members
 from sightray.scene.compile import Tables
-from sightray.textures.base import Where
+from sightray.textures.base import anywhere
 from sightray.textures.checker import Checker
 
 EXAMPLES = {
@@ -43,7 +43,7 @@ def ask(material: Table, count: i64, questions: Table, answers: Table) -> i64:
     """`local` for many places; a question is u, v, p, cos_view."""
     for i in range(count):
         q, a = IN * i, OUT * i
-        where = Where(f64_at(questions, q), f64_at(questions, q + 1), vec3_at(questions, q + 2))
+        where = anywhere(f64_at(questions, q), f64_at(questions, q + 1), vec3_at(questions, q + 2))
         x = local(material, where, f64_at(questions, q + 6))
         vec3_put(answers, a, x.color)
         vec3_put(answers, a + 4, x.emission)

@@ -9,12 +9,7 @@ import pytest
 from shape_examples import EXAMPLES, norm
 
 from sightray._jit import address, kernel, native, needed_kernels
-from sightray.errors import SceneError
-from sightray.mathlib.scalars import i64
-from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, link, set_methods, vec3_at, vec3_put
-from sightray.mathlib.transform import Transform, put_columns
-from sightray.registry import members
-from sightray.scene.items import (
+from sightray.accelerators.item import (
     ITEM_WORDS,
     MOVED,
     OBJECT_FROM_WORLD,
@@ -26,6 +21,11 @@ from sightray.scene.items import (
     occluded_item,
     to_object,
 )
+from sightray.errors import SceneError
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, link, set_methods, vec3_at, vec3_put
+from sightray.mathlib.transform import Transform, put_columns
+from sightray.registry import members
 
 RAY, OUT = 12, 24
 ALL = [pytest.param(e, id=f"{name}-{i}") for name, examples in EXAMPLES.items() for i, e in enumerate(examples)]

@@ -15,7 +15,7 @@ from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, vec3_at, vec3_put
 from sightray.registry import members
 from sightray.scene.compile import Tables
-from sightray.textures.base import Where, texture_value
+from sightray.textures.base import anywhere, texture_value
 from sightray.textures.bitmap import Bitmap
 from sightray.textures.checker import Checker
 from sightray.textures.constant import Constant
@@ -38,7 +38,7 @@ EVERY = [pytest.param(t, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() 
 def ask(texture: Table, count: i64, places: Table, colours: Table) -> i64:
     """`texture_value` at many places, each u, v, p (8 words)."""
     for i in range(count):
-        where = Where(f64_at(places, 8 * i), f64_at(places, 8 * i + 1), vec3_at(places, 8 * i + 2))
+        where = anywhere(f64_at(places, 8 * i), f64_at(places, 8 * i + 1), vec3_at(places, 8 * i + 2))
         vec3_put(colours, 4 * i, texture_value(texture, where))
     return count
 

@@ -20,6 +20,8 @@ from sightray.mathlib.table import NULL, Space
 from sightray.scene.compile import compile_scene
 from sightray.scenes import build
 
+SAMPLER = sr.IndependentSampler()
+
 
 def small(name="whitted", width=48, height=36):
     scene = build(name)
@@ -44,12 +46,13 @@ def test_machine_code_and_python_see_the_same():
     scene = small(width=12, height=9)
     compiled = compile_scene(scene)
     integrator = scene.integrator
-    fast = run(compiled, integrator, sr.GaussianFilter(), samples=4, seed=3).film
+    fast = run(compiled, integrator, SAMPLER, sr.GaussianFilter(), samples=4, seed=3).film
     slow = Film(12, 9)
     compiled.tables.prepare(render_tile, compiled=False)
     space = Space()
     render_tile(
-        compiled.world, compiled.tables.row_of(integrator), slow.table, filter_table(sr.GaussianFilter(), space), NULL,
+        compiled.world, compiled.tables.row_of(integrator), compiled.tables.row_of(SAMPLER), slow.table,
+        filter_table(sr.GaussianFilter(), space), NULL,
         space.row(8), 0, 0, 12, 9, 12, 0, 4, 3,
     )  # fmt: skip
     np.testing.assert_allclose(fast.pixels, slow.pixels, rtol=1e-6, atol=1e-9)
@@ -88,10 +91,10 @@ def test_adaptive_samples_go_where_neighbours_differ():
 
 def test_film_statistics_are_the_sample_statistics():
     scene = small("stage2-local-illumination", 16, 12)
-    film = run(compile_scene(scene), scene.integrator, sr.BoxFilter(), samples=64, seed=1).film
+    film = run(compile_scene(scene), scene.integrator, SAMPLER, sr.BoxFilter(), samples=64, seed=1).film
     means = [film.pixels[..., :3] / film.pixels[..., 4:5]]
     for seed in range(2, 12):
-        again = run(compile_scene(scene), scene.integrator, sr.BoxFilter(), samples=64, seed=seed).film
+        again = run(compile_scene(scene), scene.integrator, SAMPLER, sr.BoxFilter(), samples=64, seed=seed).film
         means.append(again.pixels[..., :3] / again.pixels[..., 4:5])
     spread = (np.array(means) @ [0.2126, 0.7152, 0.0722]).std(axis=0, ddof=1)
     ratio = np.sqrt((spread**2).mean() / (film.standard_error() ** 2).mean())

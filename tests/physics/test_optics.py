@@ -15,7 +15,7 @@ from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_put, vec3_at, vec3_put
 from sightray.mathlib.vec import Vec3, dot
 from sightray.scene.compile import Tables
-from sightray.textures.base import Where
+from sightray.textures.base import anywhere
 
 MEDIA = {  # n, R(0), Brewster's angle, critical angle, R(45), R(75)
     "water": (1.333, 0.02037319, 53.12323, 48.60663, 0.02789836, 0.21237758),
@@ -28,7 +28,7 @@ MEDIA = {  # n, R(0), Brewster's angle, critical angle, R(45), R(75)
 @kernel
 def interface(material: Table, cos_view: f64, out: Table) -> i64:
     """Shares and eta of a material at an angle."""
-    answer = local(material, Where(0.0, 0.0, Vec3(0.0, 0.0, 0.0)), cos_view)
+    answer = local(material, anywhere(0.0, 0.0, Vec3(0.0, 0.0, 0.0)), cos_view)
     f64_put(out, 0, answer.mirror.x)
     f64_put(out, 1, answer.transmission.x)
     f64_put(out, 2, answer.eta)

@@ -16,7 +16,7 @@ from sightray.mathlib.table import Table, f64_at, f64_put, vec3_at, vec3_put
 from sightray.mathlib.vec import Vec3
 from sightray.registry import members
 from sightray.scene.compile import Tables
-from sightray.textures.base import Where
+from sightray.textures.base import anywhere
 
 TINY = {"width": 8, "height": 8}
 TRACERS = [sr.SimplePathTracer, sr.PathTracer]
@@ -129,7 +129,7 @@ def test_every_material_has_an_example():
 
 @kernel
 def ask_bsdf(material: Table, numbers: Table, count: i64, out: Table) -> None:
-    where = Where(0.3, 0.4, Vec3(0.0, 0.0, 0.0))
+    where = anywhere(0.3, 0.4, Vec3(0.0, 0.0, 0.0))
     for k in range(count):
         wo = vec3_at(numbers, 8 * k)
         chosen = sample_bsdf(
@@ -213,7 +213,7 @@ def test_sampling_matches_its_density(material, wo):
 
 @kernel
 def ask_density(material: Table, wo: Table, directions: Table, count: i64, out: Table) -> None:
-    where = Where(0.3, 0.4, Vec3(0.0, 0.0, 0.0))
+    where = anywhere(0.3, 0.4, Vec3(0.0, 0.0, 0.0))
     for k in range(count):
         f64_put(out, k, bsdf(material, where, vec3_at(wo, 0), vec3_at(directions, 4 * k)).density)
 

@@ -1,7 +1,8 @@
 """Items: one shape at one place. The leaves of the scene's tree.
 
 An item row is `ITEM_WORDS` words: where its shape and material stand, the number of the scene's object that it belongs
-to, the number of the light that it is the shape of (or -1), and the two matrices between world and object.
+to, the number of the light that it is the shape of (or -1), what its material is beside a plain surface, and the two
+matrices between world and object.
 Instances share the shape's row, and so its triangles and its tree.
 """
 
@@ -14,10 +15,11 @@ from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, i64_at, table_at
 from sightray.mathlib.transform import transform_normal, transform_point, transform_vector
-from sightray.mathlib.vec import Vec3
+from sightray.mathlib.vec import Vec3, normalize
 from sightray.shapes.base import Surface, intersect, occluded, surface
 
-SHAPE, MATERIAL, MOVED, OBJECT, LIGHT = 0, 1, 2, 3, 4  # MOVED: 0 where object space is world space
+SHAPE, MATERIAL, MOVED, OBJECT, LIGHT, FLAGS = 0, 1, 2, 3, 4, 5  # MOVED: 0 where object space is world space
+CUTOUT, BUMPY, ORIENTED, CLEAR = 1, 2, 4, 8  # bits of FLAGS: what the material is, see materials/base.py
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
 ITEM_WORDS = 40
 
@@ -85,6 +87,14 @@ def item_surface(item: Table, hit: ItemHit, p_object: Vec3) -> Surface:
         transform_normal(item, OBJECT_FROM_WORLD, s.shading),
         s.u, s.v, transform_vector(item, WORLD_FROM_OBJECT, s.tangent),
     )  # fmt: skip
+
+
+@kernel
+def normal_in_object(item: Table, n: Vec3) -> Vec3:
+    """A world normal as a unit vector of the item's object space."""
+    if i64_at(item, MOVED) == 0:
+        return normalize(n)
+    return normalize(transform_normal(item, WORLD_FROM_OBJECT, n))
 
 
 @kernel

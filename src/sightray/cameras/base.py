@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sightray._jit import implements, method
+from sightray._jit import implements, kernel, method
 from sightray.errors import SceneError
-from sightray.fields import derived_vector, integer
+from sightray.fields import derived_number, derived_vector, integer, number
 from sightray.mathlib.scalars import f64
-from sightray.mathlib.table import Table, vec3_at
+from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, normalize
 from sightray.registry import Member
 
@@ -26,7 +26,7 @@ MAX_SIDE = 65_536
 class Ray(NamedTuple):
     """A ray of sight: unit direction."""
 
-    origin: Vec3
+    origin: Vec3  # its 4th lane is the time, seconds
     direction: Vec3
 
 
@@ -35,6 +35,10 @@ class Camera(Member, family="cameras"):
 
     width: int = integer("image width", default=640, at_least=1, at_most=MAX_SIDE, unit="pixels")
     height: int = integer("image height", default=480, at_least=1, at_most=MAX_SIDE, unit="pixels")
+    shutter_open: float = number("when the exposure of the top row begins", default=0.0, unit="s")
+    shutter_close: float = number("when it ends; the same for a picture of an instant", default=0.0, unit="s")
+    readout: float = number("how much later the bottom row is exposed (rolling shutter)", default=0.0, unit="s")
+    _spread: Any = derived_number("angle between neighbouring rays of sight, rad", lambda c: c.pixel_angle())
 
     def world_from_camera(self) -> np.ndarray:
         """Pose, (4, 4) float64: columns +x right, +y down, +z forward, and the eye."""
@@ -71,15 +75,47 @@ class Camera(Member, family="cameras"):
         pose = self.world_from_camera()
         return (coordinates(points, 3, f"{type(self).__name__}: points") - pose[:3, 3]) @ np.linalg.inv(pose[:3, :3]).T
 
+    def pixel_angle(self) -> float:
+        """Angle between the rays of the two pixels in the middle of the picture, radians."""
+        x, y = self.width / 2, self.height / 2
+        _, (a, b) = self.rays([(x - 0.5, y), (x + 0.5, y)])
+        return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+    def check(self) -> None:
+        if self.shutter_close < self.shutter_open:
+            raise SceneError(
+                f"{type(self).__name__}.shutter_close: got {self.shutter_close:g}, before shutter_open "
+                f"{self.shutter_open:g}; allowed: the same time or later"
+            )
+
     def resized(self, width: int, height: int) -> Any:
         """The same view with another number of pixels."""
         return self.replace(width=width, height=height)
 
 
+WIDTH, HEIGHT, SHUTTER_OPEN, SHUTTER_CLOSE, READOUT, SPREAD = Camera.offsets()
+
+
 @method(0)
-def generate_ray(camera: Table, x: f64, y: f64) -> Ray:
-    """The ray of sight through continuous pixel coordinates."""
+def generate_ray(camera: Table, x: f64, y: f64, lens_u: f64, lens_v: f64, time: f64) -> Ray:
+    """The ray of sight through continuous pixel coordinates, at a time in seconds.
+
+    `lens_u` and `lens_v` in [0, 1) choose the place on the lens, if there is one; (0.5, 0.5) is its centre.
+    """
     raise NotImplementedError
+
+
+@kernel
+def sight_ray(camera: Table, x: f64, y: f64, lens_u: f64, lens_v: f64, time_u: f64) -> Ray:
+    """The ray of sight at a moment of the exposure, `time_u` in [0, 1); its origin carries the time in its 4th lane.
+
+    Points on the ray, and rays that start there, inherit the time, so everything along a path sees the same moment.
+    """
+    time = f64_at(camera, SHUTTER_OPEN)
+    time += time_u * (f64_at(camera, SHUTTER_CLOSE) - time) + y / i64_at(camera, HEIGHT) * f64_at(camera, READOUT)
+    ray = generate_ray(camera, x, y, lens_u, lens_v, time)
+    o = ray.origin
+    return Ray(Vec3(o.x, o.y, o.z, time), ray.direction)
 
 
 class _Pinhole(Camera):
@@ -116,11 +152,11 @@ class _Pinhole(Camera):
         return np.broadcast_to(self.world_from_camera()[:3, 3], d.shape).copy(), d
 
 
-_EYE, _CORNER, _RIGHT, _DOWN = _Pinhole.offsets()[2:]
+_EYE, _CORNER, _RIGHT, _DOWN = _Pinhole.offsets()[-4:]
 
 
 @implements(generate_ray, _Pinhole)
-def generate_pinhole_ray(camera: Table, x: f64, y: f64) -> Ray:
+def generate_pinhole_ray(camera: Table, x: f64, y: f64, lens_u: f64, lens_v: f64, time: f64) -> Ray:
     d = vec3_at(camera, _CORNER) + vec3_at(camera, _RIGHT) * x + vec3_at(camera, _DOWN) * y
     return Ray(vec3_at(camera, _EYE), normalize(d))
 

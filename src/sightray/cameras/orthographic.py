@@ -33,6 +33,7 @@ class OrthographicCamera(Camera):
     _down: Any = derived_vector("one pixel down", lambda c: c.plane()[2])
 
     def check(self) -> None:
+        super().check()
         self.world_from_camera()
 
     def world_from_camera(self) -> np.ndarray:
@@ -65,6 +66,6 @@ _DIRECTION, _CORNER, _RIGHT, _DOWN = OrthographicCamera.offsets()[-4:]
 
 
 @implements(generate_ray, OrthographicCamera)
-def generate_parallel_ray(camera: Table, x: f64, y: f64) -> Ray:
+def generate_parallel_ray(camera: Table, x: f64, y: f64, lens_u: f64, lens_v: f64, time: f64) -> Ray:
     origin = vec3_at(camera, _CORNER) + vec3_at(camera, _RIGHT) * x + vec3_at(camera, _DOWN) * y
     return Ray(origin, vec3_at(camera, _DIRECTION))

@@ -25,6 +25,7 @@ class PerspectiveCamera(_Pinhole):
     pixel_aspect: float = number("width of a pixel over its height", default=1.0, above=0)
 
     def check(self) -> None:
+        super().check()
         self.world_from_camera()
 
     def world_from_camera(self) -> np.ndarray:

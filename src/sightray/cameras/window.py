@@ -33,6 +33,7 @@ class WindowCamera(_Pinhole):
     distance: float = number("from the eye to the window", default=2.0, above=0, unit="m")
 
     def check(self) -> None:
+        super().check()
         for low, high in (("left", "right"), ("bottom", "top")):
             a, b = getattr(self, low), getattr(self, high)
             if not a < b:

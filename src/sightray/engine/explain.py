@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sightray.cameras.base import generate_ray
-from sightray.engine.pixels import OWN, render_tile
+from sightray.cameras.base import sight_ray
+from sightray.engine.pixels import render_tile
 from sightray.errors import SceneError
 from sightray.images.transfer import encode_bytes
 from sightray.integrators.base import radiance
@@ -27,9 +27,9 @@ from sightray.integrators.notes import (
     TermNote,
     recording,
 )  # fmt: skip
-from sightray.mathlib.rng import stream
 from sightray.mathlib.table import table_at
 from sightray.mathlib.vec import Vec3
+from sightray.samplers.base import begin, default_sampler, nested
 from sightray.scene.compile import Compiled, require_camera
 from sightray.scene.world import CAMERA
 
@@ -60,11 +60,12 @@ def explain_pixel(compiled: Compiled, integrator: Any, column: int, row: int, se
         )
     tables = compiled.tables
     integrator_row = tables.row_of(integrator)
+    sampler_row = tables.row_of(default_sampler())
     tables.prepare(render_tile, compiled=False)
-    ray = generate_ray(table_at(compiled.world, CAMERA), column + 0.5, row + 0.5)
-    key = stream(stream(stream(seed, row * camera.width + column), 0), OWN)
+    ray = sight_ray(table_at(compiled.world, CAMERA), column + 0.5, row + 0.5, 0.5, 0.5, 0.5)
+    draws = nested(begin(sampler_row, column, row, seed, 0, 1), 0)
     with recording() as notes:
-        found = radiance(integrator_row, compiled.world, ray, key)
+        found = radiance(integrator_row, compiled.world, ray, draws)
     color = (found.color.x, found.color.y, found.color.z)
     lines = [f"pixel ({column}, {row}) of {camera.width}x{camera.height}: the ray through its centre"]
     lines += _Tree(compiled, notes).lines()

@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
 
 
 def run(
-    compiled: Compiled, integrator: Any, filter: Any, *, samples: int, seed: int,
+    compiled: Compiled, integrator: Any, sampler: Any, filter: Any, *, samples: int, seed: int,
     threads: int | None = None, progress: Callback | None = None,
     refine: Callable[[Film], np.ndarray | None] | None = None,
 ) -> Outcome:  # fmt: skip
@@ -55,6 +55,7 @@ def run(
     """
     camera = require_camera(compiled.scene)
     compiled.tables.row_of(integrator)
+    compiled.tables.row_of(sampler)
     began = time.perf_counter()
 
     def compiling(done: int, total: int, name: str) -> None:
@@ -62,7 +63,7 @@ def run(
             progress(Progress("compile", done, total, time.perf_counter() - began, 0, name))
 
     compiled.tables.prepare(render_tile, compiling)
-    job = _Job(compiled, integrator, Film(camera.width, camera.height), filter, seed, threads, progress)
+    job = _Job(compiled, integrator, sampler, Film(camera.width, camera.height), filter, seed, threads, progress)
     try:
         job.sweep(Pass(0, samples, None))
         plan = None if refine is None else refine(job.film)
@@ -86,10 +87,11 @@ def thread_count(threads: int | None) -> int:
 class _Job:
     """State of a run that its threads share."""
 
-    def __init__(self, compiled: Compiled, integrator: Any, film: Film, filter: Any, seed: int,
-                 threads: int | None, progress: Callback | None):  # fmt: skip
+    def __init__(self, compiled: Compiled, integrator: Any, sampler: Any, film: Film, filter: Any,
+                 seed: int, threads: int | None, progress: Callback | None):  # fmt: skip
         self.film, self.seed, self.progress = film, seed, progress
         self.world, self.integrator = compiled.world, compiled.tables.row_of(integrator)
+        self.sampler = compiled.tables.row_of(sampler)
         self.space = Space()
         self.filter, self.stop = filter_table(filter, self.space), self.space.array(aligned(8, np.int64))
         self.threads = thread_count(threads)
@@ -124,7 +126,7 @@ class _Job:
         x0, y0, x1, y1 = tile
         taken = (x1 - x0) * (y1 - y0) * this.samples if this.plan is None else int(this.plan[y0:y1, x0:x1].sum())
         rays = self.kernel(
-            self.world, self.integrator, self.film.table, self.filter, plan, self.stop,
+            self.world, self.integrator, self.sampler, self.film.table, self.filter, plan, self.stop,
             x0, y0, x1, y1, self.film.width, this.first, this.samples, self.seed,
         )  # fmt: skip
         return taken, rays

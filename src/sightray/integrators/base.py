@@ -10,6 +10,7 @@ from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table
 from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
+from sightray.samplers.base import Draws
 
 
 class Radiance(NamedTuple):
@@ -24,6 +25,6 @@ class Integrator(Member, family="integrators"):
 
 
 @method(0)
-def radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radiance:
-    """Light along a ray of sight; `key` names the stream of its random numbers."""
+def radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
+    """Light along a ray of sight; `draws` gives its random numbers."""
     raise NotImplementedError

@@ -8,22 +8,24 @@ from sightray._jit import implements, kernel
 from sightray.cameras.base import Ray
 from sightray.fields import integer, number
 from sightray.integrators.base import Integrator, Radiance, radiance
-from sightray.integrators.shading import Frame, first_step, frame_about, into, out_of
+from sightray.integrators.shading import Frame, first_step, frame_of, into, out_of
 from sightray.lights.base import cells, direction_density, illuminate
 from sightray.materials.base import bsdf, emitted, interior, sample_bsdf
-from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
-from sightray.mathlib.vec import Vec3, grey, max3, vexp
+from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table
+from sightray.mathlib.vec import Vec3, grey, max3
+from sightray.media.base import transmittance
+from sightray.samplers.base import Draws, nested, pair
 from sightray.scene.world import (
-    BACKGROUND,
     Point,
+    background,
     find_closest,
     is_blocked,
     light_at,
     light_count,
     on_seen_side,
     point_of,
+    sight_beam,
 )
 
 
@@ -46,13 +48,13 @@ class PathTracer(Integrator):
 
 DEPTH, ROULETTE_DEPTH, CLAMP = PathTracer.offsets()
 
-# Dimensions of a bounce's random stream.
-U, V, CHOICE, LIGHT, CELL, LIGHT_U, LIGHT_V, ROULETTE = 0, 1, 2, 3, 4, 5, 6, 7
+# Dimensions of a bounce's draws.
+WAY, CHOICE, LIGHT, PLACE = 0, 1, 2, 3
 LONGEST_ODDS = 0.95  # of going on in Russian roulette
 
 
 @implements(radiance, PathTracer)
-def path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radiance:
+def path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
     o, d = ray.origin, ray.direction
     color, beta = grey(0.0), grey(1.0)  # beta: path throughput
     density = 0.0  # with which the last direction was chosen; 0 for rays of sight and mirrors
@@ -64,11 +66,13 @@ def path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radian
         rays += 1
         hit = find_closest(world, o, d, t_min, math.inf)
         if hit.item < 0:
-            color += limited(integrator, beta * vec3_at(world, BACKGROUND), depth)
+            color += limited(integrator, beta * background(world, d), depth)
             break
-        point = on_seen_side(point_of(world, hit, o, d), d)
+        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world)), d)
         if point.cos_view < 0.0:
-            beta = beta * vexp(interior(point.material) * -hit.t)
+            inside = interior(point.material)
+            if not is_null(inside):
+                beta = beta * transmittance(inside, o, d, hit.t, no_table(), draws)
         own_light = emitted(point.material, point.where, point.cos_view)
         if max3(own_light) > 0.0:
             weight = chance_weight(world, point.light, o, d, hit.t, density)
@@ -77,8 +81,8 @@ def path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radian
             break
 
         # Look for a light.
-        own = stream(key, depth)
-        frame = frame_about(point.shading)
+        own = nested(draws, depth)
+        frame = frame_of(point)
         wo = into(frame, -d)
         t_min = first_step(math.nan, point.p, hit.t)
         if light_count(world) > 0:
@@ -87,14 +91,14 @@ def path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radian
             color += limited(integrator, beta * direct.color, depth + 1)
 
         # Go on in a direction that the material chooses, or end the walk if it has become unimportant.
-        u, v, choice = uniform(own, U), uniform(own, V), uniform(own, CHOICE)
-        chosen = sample_bsdf(point.material, point.where, wo, u, v, choice)
+        way, choice = pair(own, WAY), pair(own, CHOICE)
+        chosen = sample_bsdf(point.material, point.where, wo, way.u, way.v, choice.u)
         beta = beta * chosen.weight
         density = chosen.density
         odds = 1.0
         if depth >= i64_at(integrator, ROULETTE_DEPTH):
             odds = min(max3(beta), LONGEST_ODDS)
-        if max3(beta) <= 0.0 or uniform(own, ROULETTE) >= odds:
+        if max3(beta) <= 0.0 or choice.v >= odds:
             break
         beta = beta / odds
         o, d = point.p, out_of(frame, chosen.wi)
@@ -103,13 +107,14 @@ def path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radian
 
 
 @kernel
-def direct_light(world: Table, point: Point, frame: Frame, wo: Vec3, t_min: f64, own: i64) -> Radiance:
+def direct_light(world: Table, point: Point, frame: Frame, wo: Vec3, t_min: f64, own: Draws) -> Radiance:
     """Light from one light, chosen evenly, at one of its points, over the probability of that choice."""
     count = light_count(world)
-    light = light_at(world, min(count - 1, int(uniform(own, LIGHT) * count)))
+    which, place = pair(own, LIGHT), pair(own, PLACE)
+    light = light_at(world, min(count - 1, int(which.u * count)))
     parts = cells(light)
-    cell = min(parts - 1, int(uniform(own, CELL) * parts))
-    sample = illuminate(light, point.p, cell, uniform(own, LIGHT_U), uniform(own, LIGHT_V))
+    cell = min(parts - 1, int(which.v * parts))
+    sample = illuminate(light, point.p, cell, place.u, place.v)
     answer = bsdf(point.material, point.where, wo, into(frame, sample.direction))
     found = answer.value * sample.irradiance * float(count * parts)
     if max3(found) <= 0.0:

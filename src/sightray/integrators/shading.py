@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sightray._jit import kernel
+from sightray.accelerators.item import ORIENTED
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64
-from sightray.mathlib.vec import Vec3, cross, dot, max3, vabs
+from sightray.mathlib.vec import Vec3, cross, dot, max3, normalize, vabs
+from sightray.scene.world import Point
 
 
 class Frame(NamedTuple):
@@ -23,6 +25,17 @@ def frame_about(n: Vec3) -> Frame:
     """A frame whose third axis is the unit vector `n`."""
     s = perpendicular(n)
     return Frame(s, cross(n, s), n)
+
+
+@kernel
+def frame_of(point: Point) -> Frame:
+    """The frame in which a point's material is asked: its x is along the tangent where the material cares."""
+    if point.flags & ORIENTED != 0:
+        across = cross(point.shading, point.tangent)
+        if dot(across, across) > 0.0:
+            t = normalize(across)
+            return Frame(cross(t, point.shading), t, point.shading)
+    return frame_about(point.shading)
 
 
 @kernel

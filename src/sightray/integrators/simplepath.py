@@ -8,13 +8,13 @@ from sightray._jit import implements
 from sightray.cameras.base import Ray
 from sightray.fields import integer
 from sightray.integrators.base import Integrator, Radiance, radiance
-from sightray.integrators.shading import first_step, frame_about, into, out_of
+from sightray.integrators.shading import first_step, frame_of, into, out_of
 from sightray.materials.base import emitted, interior, sample_bsdf
-from sightray.mathlib.rng import stream, uniform
-from sightray.mathlib.scalars import i64
-from sightray.mathlib.table import Table, i64_at, vec3_at
-from sightray.mathlib.vec import grey, max3, vexp
-from sightray.scene.world import BACKGROUND, find_closest, on_seen_side, point_of
+from sightray.mathlib.table import Table, i64_at, is_null, no_table
+from sightray.mathlib.vec import grey, max3
+from sightray.media.base import transmittance
+from sightray.samplers.base import Draws, nested, number, pair
+from sightray.scene.world import background, find_closest, on_seen_side, point_of, sight_beam
 
 
 class SimplePathTracer(Integrator):
@@ -29,10 +29,11 @@ class SimplePathTracer(Integrator):
 
 
 (DEPTH,) = SimplePathTracer.offsets()
+WAY, CHOICE = 0, 1  # dimensions of a bounce's draws
 
 
 @implements(radiance, SimplePathTracer)
-def simple_path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radiance:
+def simple_path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
     o, d = ray.origin, ray.direction
     color, beta = grey(0.0), grey(1.0)  # beta: path throughput
     t_min = 0.0
@@ -42,18 +43,20 @@ def simple_path_radiance(integrator: Table, world: Table, ray: Ray, key: i64) ->
         rays += 1
         hit = find_closest(world, o, d, t_min, math.inf)
         if hit.item < 0:
-            color += beta * vec3_at(world, BACKGROUND)
+            color += beta * background(world, d)
             break
-        point = on_seen_side(point_of(world, hit, o, d), d)
+        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world)), d)
         if point.cos_view < 0.0:
-            beta = beta * vexp(interior(point.material) * -hit.t)
+            inside = interior(point.material)
+            if not is_null(inside):
+                beta = beta * transmittance(inside, o, d, hit.t, no_table(), draws)
         color += beta * emitted(point.material, point.where, point.cos_view)
 
         # Go on in a direction that the material chooses.
-        own = stream(key, depth)
-        frame = frame_about(point.shading)
-        u, v, choice = uniform(own, 0), uniform(own, 1), uniform(own, 2)
-        chosen = sample_bsdf(point.material, point.where, into(frame, -d), u, v, choice)
+        own = nested(draws, depth)
+        frame = frame_of(point)
+        way = pair(own, WAY)
+        chosen = sample_bsdf(point.material, point.where, into(frame, -d), way.u, way.v, number(own, CHOICE))
         beta = beta * chosen.weight
         if max3(beta) <= 0.0:
             break

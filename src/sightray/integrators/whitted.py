@@ -27,13 +27,23 @@ from sightray.integrators.shading import first_step
 from sightray.lights.base import cells, illuminate
 from sightray.materials.base import BLINN, Local, local
 from sightray.mathlib.frame import reflect, refract
-from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_put, scratch, vec3_at, vec3_put
 from sightray.mathlib.vec import Vec3, dot, grey, max3, normalize, vexp
+from sightray.samplers.base import Draws, nested, pair
 from sightray.scene.world import AMBIENT as WORLD_AMBIENT
-from sightray.scene.world import BACKGROUND as WORLD_BACKGROUND
-from sightray.scene.world import Point, find_closest, is_blocked, light_at, light_count, on_seen_side, point_of
+from sightray.scene.world import (
+    Point,
+    background,
+    find_closest,
+    is_blocked,
+    light_at,
+    light_count,
+    on_seen_side,
+    point_of,
+    sight_beam,
+    thin_beam,
+)
 
 MAX_DEPTH = 200
 
@@ -78,7 +88,7 @@ STACK_WORDS = (MAX_DEPTH + 2) * RAY_WORDS
 
 
 @implements(radiance, Whitted)
-def whitted_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Radiance:
+def whitted_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
     stack = scratch(STACK_WORDS)
     waiting = push(stack, 0, ray.origin, ray.direction, grey(1.0), 0.0, 0, SIGHT, -1)
     color = grey(0.0)
@@ -95,12 +105,13 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Rad
         rays += 1
         hit = find_closest(world, o, d, f64_at(top, T_MIN), math.inf)
         if hit.item < 0:
-            note_term(number, BACKGROUND, vec3_at(world, WORLD_BACKGROUND))
-            color += weight * vec3_at(world, WORLD_BACKGROUND)
+            behind = background(world, d)
+            note_term(number, BACKGROUND, behind)
+            color += weight * behind
             continue
 
         # Light the point where it is seen; light lost inside glass on the way dims all that follows.
-        point = point_of(world, hit, o, d)
+        point = point_of(world, hit, o, d, sight_beam(world))
         if i64_at(integrator, TWO_SIDED) != 0:
             point = on_seen_side(point, d)
         terms = local(point.material, point.where, point.cos_view)
@@ -110,7 +121,7 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, key: i64) -> Rad
             left = vexp(terms.absorption * -hit.t)
             note_term(number, ABSORPTION, left)
             weight = weight * left
-        lit = illuminated(integrator, world, point, terms, d, t_min, number, key)
+        lit = illuminated(integrator, world, point, terms, d, t_min, number, draws)
         color += weight * lit.color
         rays += lit.rays
 
@@ -147,7 +158,7 @@ def push(
 
 @kernel
 def illuminated(
-    integrator: Table, world: Table, point: Point, terms: Local, d: Vec3, t_min: f64, ray: i64, key: i64
+    integrator: Table, world: Table, point: Point, terms: Local, d: Vec3, t_min: f64, ray: i64, draws: Draws
 ) -> Radiance:
     """Light that a surface sends towards the viewer by itself, from ambient light and from each light."""
     if i64_at(integrator, ILLUMINATION) == 0:
@@ -161,7 +172,7 @@ def illuminated(
     n = point.shading
     if i64_at(integrator, TWO_SIDED) != 0 and point.cos_view < 0.0:
         n = -n
-    own = stream(key, ray)
+    own = nested(draws, ray)
     dimension = 0
     for index in range(light_count(world)):
         light = light_at(world, index)
@@ -169,9 +180,9 @@ def illuminated(
         seen = 0.0
         count = cells(light)
         for cell in range(count):
-            u, v = uniform(own, dimension), uniform(own, dimension + 1)
-            dimension += 2
-            sample = illuminate(light, point.p, cell, u, v)
+            place = pair(own, dimension)
+            dimension += 1
+            sample = illuminate(light, point.p, cell, place.u, place.v)
             answer = reflected(terms, n, d, sample.direction) * sample.irradiance
             if max3(answer) > 0.0:
                 visible = grey(1.0)
@@ -213,7 +224,7 @@ def transmitted(integrator: Table, world: Table, p: Vec3, l: Vec3, t_min: f64, d
         hit = find_closest(world, p, l, t, far)
         if hit.item < 0:
             break
-        point = point_of(world, hit, p, l)
+        point = point_of(world, hit, p, l, thin_beam())
         terms = local(point.material, point.where, point.cos_view)
         share = share * terms.transmission * vexp(terms.absorption * (t_min - hit.t if t == t_min else t - hit.t))
         t = hit.t + max(t_min, 1e-12)

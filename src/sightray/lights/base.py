@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from sightray._jit import implements, method
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table
-from sightray.mathlib.vec import Vec3
+from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 
 
@@ -26,6 +26,11 @@ class LightSample(NamedTuple):
 
 class Light(Member, family="lights"):
     """Base of all lights."""
+
+    @property
+    def infinite(self) -> bool:
+        """Whether it is seen where rays meet nothing, in `sky`."""
+        return False
 
     def shape(self) -> Any | None:
         """The emitting surface as a shape, for lights that can be seen; else None."""
@@ -51,6 +56,17 @@ def direction_density(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # 
     It is 0 for lights that no other ray can meet by chance: those without extent, and those that are not visible.
     """
     raise NotImplementedError
+
+
+@method(3)
+def sky(light: Table, d: Vec3) -> Vec3:
+    """Radiance, RGB, that a ray going along the unit vector d finds where it meets nothing; for `infinite` lights."""
+    raise NotImplementedError
+
+
+@implements(sky, Light)
+def no_sky(light: Table, d: Vec3) -> Vec3:
+    return grey(0.0)
 
 
 @implements(direction_density, Light)

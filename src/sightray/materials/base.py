@@ -14,8 +14,9 @@ For path tracing it answers by its bidirectional scattering distribution functio
 `wi` (to the light) are unit vectors that point away from the surface, in a frame whose z is the outward shading
 normal: z is negative inside. `bsdf` gives f times |cos wi| and the density with which `sample_bsdf` would choose wi;
 `sample_bsdf` chooses a direction with that density (per solid angle) and gives f |cos wi| / density. Mirrors and smooth
-glass have a value only in `sample_bsdf`, with density 0. `emitted` is the radiance towards the viewer, `interior` the
-absorption coefficient of the medium inside.
+glass have a value only in `sample_bsdf`, with density 0. `emitted` is the radiance towards the viewer, in RGB, and
+`interior` the medium inside. Colours come from `value_at(texture, where)` or `as_reflectance(where.bands, colour)`, so
+that the same kernels serve RGB and spectral paths.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from typing import NamedTuple
 
 from sightray._jit import implements, method
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table
+from sightray.mathlib.table import Table, no_table
 from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 from sightray.textures.base import Where
@@ -64,7 +65,33 @@ class BsdfValue(NamedTuple):
 
 
 class Material(Member, family="materials"):
-    """Base of all materials. Unless a member says otherwise it reflects, emits and absorbs nothing."""
+    """Base of all materials. Unless a member says otherwise it reflects, emits and absorbs nothing.
+
+    What a material is beside a plain surface is stated for the compiler, which spares the others the question:
+    `cutout` (it has holes: `opacity`), `bumpy` (it bends normals: `bent_normal`), `oriented` (its answers depend on
+    the direction of the tangent, so the frame's x must be along it), `clear` (light passes straight through, as
+    through the bare boundary of a fog: shadow rays go on behind it).
+    """
+
+    @property
+    def cutout(self) -> bool:
+        """Whether it has holes."""
+        return False
+
+    @property
+    def bumpy(self) -> bool:
+        """Whether it bends shading normals."""
+        return False
+
+    @property
+    def oriented(self) -> bool:
+        """Whether the direction of the tangent matters."""
+        return False
+
+    @property
+    def clear(self) -> bool:
+        """Whether light passes straight through."""
+        return False
 
 
 @method(0)
@@ -92,8 +119,23 @@ def emitted(material: Table, where: Where, cos_view: f64) -> Vec3:
 
 
 @method(4)
-def interior(material: Table) -> Vec3:
-    """Absorption coefficient of what is inside, per metre."""
+def interior(material: Table) -> Table:
+    """The medium inside; no table where nothing gets inside, or nothing is there."""
+    raise NotImplementedError
+
+
+@method(5)
+def opacity(material: Table, where: Where) -> f64:
+    """Share of light that meets the surface at all, 0 to 1; only materials with `cutout` are asked."""
+    raise NotImplementedError
+
+
+@method(6)
+def bent_normal(material: Table, where: Where, stretch: f64) -> Vec3:
+    """Shading normal, unit, in the frame of tangent (x), bitangent (y) and normal (z); only `bumpy` ones are asked.
+
+    `stretch`: metres of the surface per unit of u.
+    """
     raise NotImplementedError
 
 
@@ -113,5 +155,15 @@ def emit_nothing(material: Table, where: Where, cos_view: f64) -> Vec3:
 
 
 @implements(interior, Material)
-def absorb_nothing(material: Table) -> Vec3:
-    return grey(0.0)
+def nothing_inside(material: Table) -> Table:
+    return no_table()
+
+
+@implements(opacity, Material)
+def opaque(material: Table, where: Where) -> f64:
+    return 1.0
+
+
+@implements(bent_normal, Material)
+def straight_normal(material: Table, where: Where, stretch: f64) -> Vec3:
+    return Vec3(0.0, 0.0, 1.0)

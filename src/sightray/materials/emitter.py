@@ -34,4 +34,6 @@ def emitted_by_emitter(material: Table, where: Where, cos_view: f64) -> Vec3:
 @implements(local, Emitter)
 def local_of_emitter(material: Table, where: Where, cos_view: f64) -> Local:
     zero = grey(0.0)
-    return Local(zero, emitted_by_emitter(material, where, cos_view), zero, zero, zero, 0.0, PHONG, zero, zero, 1.0, zero)
+    return Local(
+        zero, emitted_by_emitter(material, where, cos_view), zero, zero, zero, 0.0, PHONG, zero, zero, 1.0, zero
+    )

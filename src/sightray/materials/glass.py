@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from sightray._jit import implements
-from sightray.fields import Color, color, number
+from sightray.fields import Color, color, derived_child, number
 from sightray.materials.base import PHONG, BsdfSample, Local, Material, interior, local, sample_bsdf
+from sightray.mathlib.bands import as_reflectance
 from sightray.mathlib.frame import fresnel, refract
 from sightray.mathlib.scalars import f64
-from sightray.mathlib.table import Table, f64_at, vec3_at
+from sightray.mathlib.table import Table, f64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, grey
+from sightray.media.homogeneous import clear_or_stained
 from sightray.textures.base import Where
 
 
@@ -33,9 +36,10 @@ class Glass(Material):
     ior: float = number("refractive index inside over the one outside", default=1.5, above=0)
     absorption: Color = color("absorption coefficient of the inside", default=0.0, unit="1/m")
     tint: Color = color("factor on light that passes the surface, once per passage", default=1.0, at_most=1.0)
+    _inside: Any = derived_child("the medium inside, if it absorbs", lambda g: clear_or_stained(g.absorption))
 
 
-IOR, ABSORPTION, TINT = Glass.offsets()
+IOR, ABSORPTION, TINT, INSIDE = Glass.offsets()
 
 
 @implements(local, Glass)
@@ -59,9 +63,9 @@ def sample_glass(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice
     if choice < fresnel(abs(wo.z), eta):
         return BsdfSample(Vec3(-wo.x, -wo.y, wo.z), grey(1.0), 0.0)
     facing = Vec3(0.0, 0.0, math.copysign(1.0, wo.z))
-    return BsdfSample(refract(-wo, facing, eta), vec3_at(material, TINT), 0.0)
+    return BsdfSample(refract(-wo, facing, eta), as_reflectance(where.bands, vec3_at(material, TINT)), 0.0)
 
 
 @implements(interior, Glass)
-def interior_of_glass(material: Table) -> Vec3:
-    return vec3_at(material, ABSORPTION)
+def interior_of_glass(material: Table) -> Table:
+    return table_at(material, INSIDE)

@@ -22,7 +22,7 @@ from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, grey
 from sightray.mathlib.warp import cosine_hemisphere
-from sightray.textures.base import Where, texture_value, textured
+from sightray.textures.base import Where, textured, value_at
 
 
 class Lambert(Material):
@@ -37,7 +37,7 @@ ALBEDO, EMISSION = Lambert.offsets()
 
 @implements(local, Lambert)
 def local_of_lambert(material: Table, where: Where, cos_view: f64) -> Local:
-    albedo = texture_value(table_at(material, ALBEDO), where)
+    albedo = value_at(table_at(material, ALBEDO), where)
     zero = grey(0.0)
     return Local(
         albedo, vec3_at(material, EMISSION), albedo, albedo * (1.0 / math.pi), zero, 0.0, PHONG, zero, zero, 1.0, zero
@@ -50,7 +50,7 @@ def sample_lambert(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choi
     density = wi.z / math.pi
     if wo.z < 0.0:
         wi = -wi
-    return BsdfSample(wi, texture_value(table_at(material, ALBEDO), where), density)
+    return BsdfSample(wi, value_at(table_at(material, ALBEDO), where), density)
 
 
 @implements(bsdf, Lambert)
@@ -58,7 +58,7 @@ def bsdf_of_lambert(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfVa
     if wo.z * wi.z <= 0.0:
         return BsdfValue(grey(0.0), 0.0)
     density = abs(wi.z) / math.pi
-    return BsdfValue(texture_value(table_at(material, ALBEDO), where) * density, density)
+    return BsdfValue(value_at(table_at(material, ALBEDO), where) * density, density)
 
 
 @implements(emitted, Lambert)

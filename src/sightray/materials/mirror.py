@@ -9,7 +9,7 @@ from sightray.materials.base import PHONG, BsdfSample, Local, Material, local, s
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, table_at
 from sightray.mathlib.vec import Vec3, grey
-from sightray.textures.base import Where, texture_value, textured
+from sightray.textures.base import Where, textured, value_at
 
 
 class Mirror(Material):
@@ -27,10 +27,10 @@ class Mirror(Material):
 @implements(local, Mirror)
 def local_of_mirror(material: Table, where: Where, cos_view: f64) -> Local:
     zero = grey(0.0)
-    reflectance = texture_value(table_at(material, REFLECTANCE), where)
+    reflectance = value_at(table_at(material, REFLECTANCE), where)
     return Local(reflectance, zero, zero, zero, zero, 0.0, PHONG, reflectance, zero, 1.0, zero)
 
 
 @implements(sample_bsdf, Mirror)
 def sample_mirror(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
-    return BsdfSample(Vec3(-wo.x, -wo.y, wo.z), texture_value(table_at(material, REFLECTANCE), where), 0.0)
+    return BsdfSample(Vec3(-wo.x, -wo.y, wo.z), value_at(table_at(material, REFLECTANCE), where), 0.0)

@@ -13,7 +13,7 @@ from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, cross, dot, grey, max3
 from sightray.mathlib.warp import cosine_hemisphere, power_cosine
-from sightray.textures.base import Where, texture_value, textured
+from sightray.textures.base import Where, textured, value_at
 
 HIGHLIGHTS = ("phong", "blinn")  # at the indices PHONG and BLINN of the contract, because kernels see the index
 
@@ -53,16 +53,16 @@ DIFFUSE, SPECULAR, AMBIENT, SHININESS, EMISSION, MIRROR, HIGHLIGHT = Phong.offse
 
 @implements(local, Phong)
 def local_of_phong(material: Table, where: Where, cos_view: f64) -> Local:
-    diffuse = texture_value(table_at(material, DIFFUSE), where)
+    diffuse = value_at(table_at(material, DIFFUSE), where)
     return Local(
         diffuse,
         vec3_at(material, EMISSION),
-        texture_value(table_at(material, AMBIENT), where),
+        value_at(table_at(material, AMBIENT), where),
         diffuse,
-        texture_value(table_at(material, SPECULAR), where),
+        value_at(table_at(material, SPECULAR), where),
         f64_at(material, SHININESS),
         i64_at(material, HIGHLIGHT),
-        texture_value(table_at(material, MIRROR), where),
+        value_at(table_at(material, MIRROR), where),
         grey(0.0), 1.0, grey(0.0),
     )  # fmt: skip
 
@@ -71,9 +71,9 @@ def local_of_phong(material: Table, where: Where, cos_view: f64) -> Local:
 def parts(material: Table, where: Where) -> Vec3:
     """With which probability the diffuse part, the highlight and the mirror are sampled: by their largest channels."""
     shares = Vec3(
-        max3(texture_value(table_at(material, DIFFUSE), where)),
-        max3(texture_value(table_at(material, SPECULAR), where)),
-        max3(texture_value(table_at(material, MIRROR), where)),
+        max3(value_at(table_at(material, DIFFUSE), where)),
+        max3(value_at(table_at(material, SPECULAR), where)),
+        max3(value_at(table_at(material, MIRROR), where)),
     )
     total = shares.x + shares.y + shares.z
     return shares / total if total > 0.0 else Vec3(1.0, 0.0, 0.0)
@@ -85,8 +85,8 @@ def bsdf_of_phong(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValu
         return BsdfValue(grey(0.0), 0.0)
     n, share = f64_at(material, SHININESS), parts(material, where)
     lobe = max(0.0, dot(Vec3(-wo.x, -wo.y, wo.z), wi)) ** n / (2.0 * math.pi)
-    f = texture_value(table_at(material, DIFFUSE), where) * (1.0 / math.pi)
-    f += texture_value(table_at(material, SPECULAR), where) * ((n + 2.0) * lobe)
+    f = value_at(table_at(material, DIFFUSE), where) * (1.0 / math.pi)
+    f += value_at(table_at(material, SPECULAR), where) * ((n + 2.0) * lobe)
     density = share.x * abs(wi.z) / math.pi + share.y * (n + 1.0) * lobe
     return BsdfValue(f * abs(wi.z), density)
 
@@ -96,7 +96,7 @@ def sample_phong(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice
     share = parts(material, where)
     mirrored = Vec3(-wo.x, -wo.y, wo.z)
     if choice < share.z:
-        return BsdfSample(mirrored, texture_value(table_at(material, MIRROR), where) / share.z, 0.0)
+        return BsdfSample(mirrored, value_at(table_at(material, MIRROR), where) / share.z, 0.0)
     if choice < share.z + share.x:
         wi = cosine_hemisphere(u, v)
         wi = wi if wo.z > 0.0 else -wi

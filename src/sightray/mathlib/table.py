@@ -146,6 +146,12 @@ def advance(table: Table, words: i64) -> Table:
 
 
 @primitive
+def no_table() -> Table:
+    """The table that is none; only its null test is allowed."""
+    return NULL
+
+
+@primitive
 def is_null(table: Table) -> bool:
     """Whether this is no table at all."""
     return table.address == 0

@@ -80,6 +80,11 @@ def advance(builder: Any, pointer: Any, words: Any) -> Any:
     return element(builder, pointer, words, I8, 8)
 
 
+@lower(table.no_table)
+def no_table(builder: Any) -> Any:
+    return ir.Constant(POINTER, None)
+
+
 @lower(table.is_null)
 def is_null(builder: Any, pointer: Any) -> Any:
     return builder.icmp_unsigned("==", pointer, ir.Constant(POINTER, None))

@@ -123,6 +123,18 @@ def max3(a: Vec3) -> f64:
 
 
 @primitive
+def max4(a: Vec3) -> f64:
+    """Largest of all four lanes."""
+    return max(a.x, a.y, a.z, a.w)
+
+
+@primitive
+def mean4(a: Vec3) -> f64:
+    """Mean of all four lanes."""
+    return (a.x + a.y + (a.z + a.w)) * 0.25
+
+
+@primitive
 def vexp(a: Vec3) -> Vec3:
     """Exponential of each lane."""
     return Vec3(math.exp(a.x), math.exp(a.y), math.exp(a.z), math.exp(a.w))

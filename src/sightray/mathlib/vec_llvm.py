@@ -183,6 +183,19 @@ def max3(builder: Any, a: Any) -> Any:
     return larger(builder, larger(builder, lane(builder, a, 0), lane(builder, a, 1)), lane(builder, a, 2))
 
 
+@lower(vec.max4)
+def max4(builder: Any, a: Any) -> Any:
+    larger = _select(">")
+    return larger(builder, max3(builder, a), lane(builder, a, 3))
+
+
+@lower(vec.mean4)
+def mean4(builder: Any, a: Any) -> Any:
+    xy = builder.fadd(lane(builder, a, 0), lane(builder, a, 1))
+    total = builder.fadd(xy, builder.fadd(lane(builder, a, 2), lane(builder, a, 3)))
+    return builder.fmul(total, ir.Constant(F64, 0.25))
+
+
 @lower(vec.vexp)
 def vexp(builder: Any, a: Any) -> Any:
     for index in range(4):

@@ -105,6 +105,12 @@ class Compiled:
         world.view(np.int64)[world_row.MERGED] = world_row.NONE if self.merged is None else len(self.items)
         link(world, world_row.ORIGIN, None if self.merged is None else space.array(self.merged.origin))
         world.view(np.int64)[world_row.LIGHT_COUNT] = len(scene.lights)
+        integers = items.view(np.int64).reshape(-1, item_row.ITEM_WORDS)
+        world.view(np.int64)[world_row.FLAGS] = np.bitwise_or.reduce(integers[:, item_row.FLAGS])
+        link(world, world_row.MEDIUM, None if scene.medium is None else tables.row_of(scene.medium))
+        skies = np.array([k for k, light in enumerate(scene.lights) if light.infinite], np.int64)
+        link(world, world_row.SKIES, space.array(skies) if len(skies) else None)
+        world.view(np.int64)[world_row.SKY_COUNT] = len(skies)
         if scene.camera is not None:
             link(world, world_row.CAMERA, tables.row_of(scene.camera))
         numbers = world.view(np.float64)
@@ -127,6 +133,7 @@ class Compiled:
             integers[start + item_row.MOVED] = not item.transform.is_identity
             integers[start + item_row.OBJECT] = item.object
             integers[start + item_row.LIGHT] = lights.get(item.object, -1)
+            integers[start + item_row.FLAGS] = flags_of(item.material)
             put_columns(items, start + item_row.OBJECT_FROM_WORLD, item.transform.inverse)
             put_columns(items, start + item_row.WORLD_FROM_OBJECT, item.transform.matrix)
             lower[index], upper[index] = world_bounds(item)
@@ -179,6 +186,12 @@ def world_bounds(item: Item) -> tuple[np.ndarray, np.ndarray]:
     m = item.transform.matrix
     a, b = m[:3, :3] * lower, m[:3, :3] * upper
     return m[:3, 3] + np.minimum(a, b).sum(1), m[:3, 3] + np.maximum(a, b).sum(1)
+
+
+def flags_of(material: Any) -> int:
+    """What a material is beside a plain surface, as the bits of an item's FLAGS."""
+    kinds = ("cutout", "bumpy", "oriented", "clear")  # in the order of the bits CUTOUT, BUMPY, ORIENTED, CLEAR
+    return sum(1 << bit for bit, kind in enumerate(kinds) if getattr(material, kind))
 
 
 def light_indices(scene: Scene) -> list[int]:

@@ -38,6 +38,7 @@ class Scene(Member, family="scene"):
     camera : what the picture is taken with; None for scenes that are only asked, never rendered.
     background : linear colour where a ray meets nothing.
     ambient : light that reaches every surface from everywhere, times the material's ambient colour.
+    medium : what fills the space around the objects, such as fog; None for a vacuum.
     integrator : used by `render` where none is given.
     samples : per pixel, used by `render` where none are given.
     transfer : how bytes are made: "srgb" (round) or "floor" (the course rule: no gamma, rounded down).
@@ -47,6 +48,8 @@ class Scene(Member, family="scene"):
     camera: Any = child("what the picture is taken with", "cameras", default=None, optional=True, packed=False)
     background: Color = color("where a ray meets nothing", default=0.0)
     ambient: Color = color("light from everywhere", default=0.0)
+    medium: Any = child("what fills the space around the objects, such as fog", "media", default=None, optional=True,
+                        packed=False)  # fmt: skip
     integrator: Any = child("how light is computed", "integrators", default=None, optional=True, packed=False)
     samples: int = integer("rays of sight per pixel", default=1, at_least=1, at_most=1 << 20)
     transfer: str = choice("how bytes are made", ("srgb", "floor"), default="srgb")

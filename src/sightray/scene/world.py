@@ -6,19 +6,44 @@ from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.accelerators.base import blocked, closest
-from sightray.accelerators.item import LIGHT, MATERIAL, ItemHit, item_at, item_surface, to_object
+from sightray.accelerators.item import (
+    BUMPY,
+    CUTOUT,
+    LIGHT,
+    MATERIAL,
+    ItemHit,
+    item_at,
+    item_surface,
+    normal_in_object,
+    to_object,
+)
+from sightray.accelerators.item import FLAGS as ITEM_FLAGS
 from sightray.bvh.bvh8 import int_at
+from sightray.cameras.base import SPREAD
+from sightray.lights.base import sky
+from sightray.materials.base import bent_normal, opacity
+from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, i64_at, table_at
-from sightray.mathlib.vec import Vec3, dot, normalize
+from sightray.mathlib.table import Table, f64_at, i64_at, no_table, table_at, vec3_at
+from sightray.mathlib.vec import Vec3, cross, dot, length, normalize
 from sightray.textures.base import Where
 
 TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4
 MERGED, ORIGIN = 5, 6  # item number of the small meshes put together, or NONE; whose triangles its triangles are
 BACKGROUND, AMBIENT = 8, 12
-WORLD_WORDS = 16
+FLAGS, MEDIUM, SKIES, SKY_COUNT, CHOOSER = 16, 17, 18, 19, 20  # SKIES: numbers of the lights that are infinite
+WORLD_WORDS = 24
 NONE = -2
+SIEVE = 1e6  # places per metre at which a ray may fall through a half-open surface or not
 GRAZING = 1e-3  # cosine of the viewer and a shading normal that was bent
+
+
+class Beam(NamedTuple):
+    """What a ray carries beside its line: how wide it is, and in which colours it sees."""
+
+    width: f64  # metres, where it starts
+    spread: f64  # by which it grows per metre
+    bands: Table  # see mathlib/bands.py; null for RGB
 
 
 class Point(NamedTuple):
@@ -31,11 +56,47 @@ class Point(NamedTuple):
     material: Table
     where: Where
     light: i64  # number of the light whose surface this is, or -1
+    tangent: Vec3  # derivative of the point by u, metres
+    flags: i64  # what the material is beside a plain surface: CUTOUT, BUMPY, ORIENTED, CLEAR
+
+
+@kernel
+def thin_beam() -> Beam:
+    """A ray without width, in RGB."""
+    return Beam(0.0, 0.0, no_table())
+
+
+@kernel
+def sight_beam(world: Table) -> Beam:
+    """A ray of sight, as wide as the camera's pixels."""
+    return Beam(0.0, f64_at(table_at(world, CAMERA), SPREAD), no_table())
 
 
 @kernel
 def find_closest(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemHit:
-    """Nearest hit of a ray with the scene."""
+    """Nearest hit of a ray with the scene; holes in surfaces let it through."""
+    hit = find_closest_surface(world, o, d, t_min, t_max)
+    if i64_at(world, FLAGS) & CUTOUT != 0:
+        while hit.item >= 0 and through_hole(world, hit, o, d):
+            hit = find_closest_surface(world, o, d, hit.t, t_max)
+    return hit
+
+
+@kernel
+def through_hole(world: Table, hit: ItemHit, o: Vec3, d: Vec3) -> bool:
+    """Whether a surface lets this ray pass: its opacity is the probability that it does not, drawn by the place."""
+    item = item_at(table_at(world, ITEMS), hit.item)
+    if i64_at(item, ITEM_FLAGS) & CUTOUT == 0:
+        return False
+    point = point_of(world, hit, o, d, thin_beam())
+    p = point.p
+    key = stream(stream(int(p.x * SIEVE), int(p.y * SIEVE)), int(p.z * SIEVE))
+    return uniform(key, 0) >= opacity(point.material, point.where)
+
+
+@kernel
+def find_closest_surface(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemHit:
+    """Nearest hit of a ray with the scene's surfaces, whether they have holes or not."""
     hit = closest(table_at(world, TREE), o, d, t_min, t_max)
     if hit.item != i64_at(world, MERGED):
         return hit
@@ -46,21 +107,38 @@ def find_closest(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Item
 @kernel
 def is_blocked(world: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
     """Whether anything stands between t_min and t_max."""
+    if i64_at(world, FLAGS) & CUTOUT != 0:
+        return find_closest(world, o, d, t_min, t_max).item >= 0
     return blocked(table_at(world, TREE), o, d, t_min, t_max)
 
 
 @kernel
-def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3) -> Point:
+def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3, beam: Beam) -> Point:
     """All that shading needs to know of a hit."""
     item = item_at(table_at(world, ITEMS), hit.item)
     p = o + d * hit.t
     p_object = to_object(item, p)
     s = item_surface(item, hit, p_object)
     shading = normalize(s.shading)
+    material, flags = table_at(item, MATERIAL), i64_at(item, ITEM_FLAGS)
+    stretch = length(s.tangent)
+    width = (beam.width + beam.spread * hit.t) / stretch if stretch > 0.0 else 0.0
+    where = Where(s.u, s.v, p_object, normal_in_object(item, s.normal), width, beam.bands)
+    if flags & BUMPY != 0:
+        shading = bent(shading, s.tangent, bent_normal(material, where, stretch))
     return Point(
-        p, normalize(s.normal), shading, -dot(shading, d), table_at(item, MATERIAL), Where(s.u, s.v, p_object),
-        i64_at(item, LIGHT),
+        p, normalize(s.normal), shading, -dot(shading, d), material, where, i64_at(item, LIGHT), s.tangent, flags,
     )  # fmt: skip
+
+
+@kernel
+def bent(n: Vec3, tangent: Vec3, local_normal: Vec3) -> Vec3:
+    """A normal that was given in the frame of the tangent and the shading normal, in the world."""
+    across = cross(n, tangent)
+    if not dot(across, across) > 0.0:
+        return n
+    b = normalize(across)
+    return normalize(cross(b, n) * local_normal.x + b * local_normal.y + n * local_normal.z)
 
 
 @kernel
@@ -76,7 +154,8 @@ def on_seen_side(point: Point, d: Vec3) -> Point:
     side = 1.0 if facing >= 0.0 else -1.0
     shading = normalize(point.shading - d * (side * GRAZING - point.cos_view))
     return Point(
-        point.p, point.normal, shading, -dot(shading, d), point.material, point.where, point.light
+        point.p, point.normal, shading, -dot(shading, d), point.material, point.where, point.light, point.tangent,
+        point.flags,
     )  # fmt: skip
 
 
@@ -90,3 +169,12 @@ def light_at(world: Table, index: i64) -> Table:
 def light_count(world: Table) -> i64:
     """Number of lights."""
     return i64_at(world, LIGHT_COUNT)
+
+
+@kernel
+def background(world: Table, d: Vec3) -> Vec3:
+    """Radiance, RGB, that a ray in direction d finds where it meets nothing: the background and all skies."""
+    color = vec3_at(world, BACKGROUND)
+    for k in range(i64_at(world, SKY_COUNT)):
+        color += sky(light_at(world, i64_at(table_at(world, SKIES), k)), d)
+    return color

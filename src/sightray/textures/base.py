@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from sightray._jit import method
+from sightray._jit import implements, kernel, method
 from sightray.errors import SceneError
 from sightray.fields import REQUIRED, Child, ColorField, Packer
+from sightray.mathlib.bands import as_reflectance
 from sightray.mathlib.scalars import f64
-from sightray.mathlib.table import Table
+from sightray.mathlib.table import Table, is_null, no_table
 from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
 
@@ -19,6 +20,9 @@ class Where(NamedTuple):
     u: f64  # texture coordinates; v runs upwards
     v: f64
     p: Vec3  # the point in the space of the shape, so that solid textures move with it
+    normal: Vec3  # unit, outward, geometric, in the space of the shape
+    width: f64  # of the ray's footprint, in units of u; 0 for a ray without width
+    bands: Table  # what the lanes of colours stand for; null for RGB (see mathlib/bands.py)
 
 
 class Texture(Member, family="textures"):
@@ -27,8 +31,33 @@ class Texture(Member, family="textures"):
 
 @method(0)
 def texture_value(texture: Table, where: Where) -> Vec3:
-    """Linear colour at a place."""
+    """Linear RGB at a place."""
     raise NotImplementedError
+
+
+@method(1)
+def texture_spectrum(texture: Table, where: Where) -> Vec3:
+    """Reflectance at a place, at the wavelengths of `where.bands`; by default the colour, up-sampled."""
+    raise NotImplementedError
+
+
+@implements(texture_spectrum, Texture)
+def up_sampled(texture: Table, where: Where) -> Vec3:
+    return as_reflectance(where.bands, texture_value(texture, where))
+
+
+@kernel
+def value_at(texture: Table, where: Where) -> Vec3:
+    """What materials see of a texture: its colour or its spectrum, as the path's lanes ask."""
+    if is_null(where.bands):
+        return texture_value(texture, where)
+    return texture_spectrum(texture, where)
+
+
+@kernel
+def anywhere(u: f64, v: f64, p: Vec3) -> Where:
+    """A place asked about by itself, outside of any picture: in RGB, by a ray without width."""
+    return Where(u, v, p, Vec3(0.0, 0.0, 1.0), 0.0, no_table())
 
 
 class Textured(Child):

@@ -1,0 +1,1 @@
+"""Participating media: fog, smoke, milk, marble, and clear stained glass."""

@@ -1,0 +1,1 @@
+"""Samplers: where in the unit cubes of choices a pixel's samples fall."""

@@ -19,7 +19,7 @@ from sightray.mathlib.vec import Vec3, normalize
 from sightray.shapes.base import Surface, intersect, occluded, surface
 
 SHAPE, MATERIAL, MOVED, OBJECT, LIGHT, FLAGS = 0, 1, 2, 3, 4, 5  # MOVED: 0 where object space is world space
-CUTOUT, BUMPY, ORIENTED, CLEAR = 1, 2, 4, 8  # bits of FLAGS: what the material is, see materials/base.py
+CUTOUT, BUMPY, ORIENTED, CLEAR, THIN, TRANSLUCENT = 1, 2, 4, 8, 16, 32  # bits of FLAGS: what the material is, see materials/base.py
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
 ITEM_WORDS = 40
 

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from sightray._jit import implements, kernel
+from sightray.accelerators.item import CLEAR
 from sightray.cameras.base import Ray
-from sightray.fields import integer, number
+from sightray.fields import derived_array, flag, integer
+from sightray.fields import number as real
 from sightray.integrators.base import Integrator, Radiance, radiance
-from sightray.integrators.shading import Frame, first_step, frame_of, into, out_of
-from sightray.lights.base import cells, direction_density, illuminate
-from sightray.materials.base import bsdf, emitted, interior, sample_bsdf
-from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table
-from sightray.mathlib.vec import Vec3, grey, max3
-from sightray.media.base import transmittance
-from sightray.samplers.base import Draws, nested, pair
-from sightray.scene.world import (
-    Point,
-    background,
-    find_closest,
-    is_blocked,
-    light_at,
-    light_count,
-    on_seen_side,
-    point_of,
-    sight_beam,
+from sightray.integrators.direct import (
+    FAR,
+    chance_weight,
+    direct_light,
+    direct_light_within,
+    light_of_skies,
+    lit_normal,
 )
+from sightray.integrators.nesting import crossing, outside
+from sightray.integrators.shading import first_step, frame_of, into, out_of
+from sightray.integrators.spectral import choose_bands, seen_colour
+from sightray.materials.base import emitted, interior, sample_bsdf
+from sightray.mathlib.bands import BANDS_WORDS, as_light, ones
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table, scratch, table_at
+from sightray.mathlib.vec import Vec3, dot, grey, max4
+from sightray.media.base import sample_distance, sample_phase, transmittance
+from sightray.samplers.base import Draws, nested, number, pair
+from sightray.scene.world import Beam, Point, find_closest, light_count, on_seen_side, point_of, sight_beam
+from sightray.spectra.upsampling import band_table
 
 
 class PathTracer(Integrator):
@@ -37,56 +41,109 @@ class PathTracer(Integrator):
     densities p and q (E. Veach, L. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering",
     SIGGRAPH 1995: the power heuristic). From `roulette_depth` on, a walk goes on with a probability that follows its
     weight (J. Arvo, D. Kirk, SIGGRAPH 1990). `SimplePathTracer` is the same without all that.
+
+    On the way a path goes through what fills the scene and the bodies it enters: media absorb, and scatter it as
+    surfaces do (E. Lafortune, Y. Willems, "Rendering participating media with bidirectional path tracing", 1996), which
+    is fog, and within marble or milk subsurface scattering. A walk's scatterings in media do not count as bounces.
+
+    With `spectral`, colours are carried as four wavelengths: dispersion, measured metals and illuminants come out
+    right, at some noise of colour.
     """
 
     max_depth: int = integer("bounces after the ray of sight", default=8, at_least=0, at_most=1000)
     roulette_depth: int = integer("bounces before Russian roulette begins", default=4, at_least=0)
-    clamp: float | None = number(
+    clamp: float | None = real(
         "most that one walk may add after its first bounce, against fireflies; None for no bias", default=None, above=0,
         optional=True)  # fmt: skip
+    spectral: bool = flag("follow wavelengths instead of red, green and blue", default=False)
+    _bands: Any = derived_array("table of spectra, if spectral", lambda p: band_table() if p.spectral else None)
 
 
-DEPTH, ROULETTE_DEPTH, CLAMP = PathTracer.offsets()
+DEPTH, ROULETTE_DEPTH, CLAMP, _, BAND_TABLE = PathTracer.offsets()
 
-# Dimensions of a bounce's draws.
-WAY, CHOICE, LIGHT, PLACE = 0, 1, 2, 3
+# Dimensions of a bounce's draws, beside those of direct.py, and the number of the nested ones for a medium.
+WAVELENGTH, WAY, CHOICE, MEDIUM = 0, 0, 1, 0
 LONGEST_ODDS = 0.95  # of going on in Russian roulette
+MOST_EVENTS = 100_000  # a walk in a body that takes nothing away must end somewhere
+WIDEST = 0.2  # spread of a beam after a matte surface, about what a filter can still tell apart
+LOBE = 0.1  # share of a lobe's width that one sample of it stands for
 
 
 @implements(radiance, PathTracer)
 def path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
+    table = table_at(integrator, BAND_TABLE)
+    if is_null(table):
+        return walk(integrator, world, ray, draws, no_table())
+    bands = scratch(BANDS_WORDS)
+    choose_bands(table, number(draws, WAVELENGTH), bands)
+    found = walk(integrator, world, ray, draws, bands)
+    return Radiance(seen_colour(bands, found.color), found.rays)
+
+
+@kernel
+def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) -> Radiance:
+    """One random walk from the eye; the lanes of its colours are what `bands` says."""
     o, d = ray.origin, ray.direction
-    color, beta = grey(0.0), grey(1.0)  # beta: path throughput
-    density = 0.0  # with which the last direction was chosen; 0 for rays of sight and mirrors
+    color, beta = grey(0.0), ones(bands)  # beta: path throughput
+    nest = outside(world)
+    beam = sight_beam(world, bands)
+    # Where the direction d was chosen, the normal there, and with which density; 0 for rays of sight and mirrors.
+    start, n, density, gone = o, grey(0.0), 0.0, 0.0
     t_min = 0.0
-    rays = 0
-    depth = 0
-    while True:
-        # Take the light that the nearest surface gives off, unless looking for lights has taken it already.
+    rays = depth = event = 0
+    while event < MOST_EVENTS:
         rays += 1
         hit = find_closest(world, o, d, t_min, math.inf)
+        own = nested(draws, event)
+        event += 1
+
+        # Go through what fills the way; in the midst of it light may scatter.
+        if not is_null(nest.here):
+            went = sample_distance(nest.here, o, d, min(hit.t, FAR), bands, nested(own, MEDIUM))
+            beta = beta * went.weight
+            if max4(beta) <= 0.0:
+                break
+            if went.scattered:
+                o = o + d * went.t
+                if light_count(world) > 0:
+                    direct = direct_light_within(world, o, d, nest, bands, own)
+                    rays += direct.rays
+                    color += limited(integrator, beta * direct.color, depth + 1)
+                way, choice = pair(own, WAY), pair(own, CHOICE)
+                turned = sample_phase(nest.here, d, way.u, way.v)
+                d, start, n, density, gone, t_min = turned.direction, o, grey(0.0), turned.density, 0.0, 0.0
+                odds = survival(integrator, beta, event)
+                if choice.v >= odds:
+                    break
+                beta = beta / odds
+                continue
+
+        # Take the light that the nearest surface gives off, unless looking for lights has taken it already.
         if hit.item < 0:
-            color += limited(integrator, beta * background(world, d), depth)
+            behind = as_light(bands, light_of_skies(world, start, n, d, density))
+            color += limited(integrator, beta * behind, depth)
             break
-        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world)), d)
-        if point.cos_view < 0.0:
-            inside = interior(point.material)
-            if not is_null(inside):
-                beta = beta * transmittance(inside, o, d, hit.t, no_table(), draws)
-        own_light = emitted(point.material, point.where, point.cos_view)
-        if max3(own_light) > 0.0:
-            weight = chance_weight(world, point.light, o, d, hit.t, density)
+        point = on_seen_side(point_of(world, hit, o, d, beam), d)
+        t_min = first_step(math.nan, point.p, hit.t)
+        gone += hit.t
+        if point.flags & CLEAR != 0:
+            nest = crossing(world, nest, point, d)
+            o = point.p
+            continue
+        if point.cos_view < 0.0 and nest.depth == 0:
+            beta = beta * darkened(point, o, d, hit.t, bands, own)
+        own_light = as_light(bands, emitted(point.material, point.where, point.cos_view))
+        if max4(own_light) > 0.0:
+            weight = chance_weight(world, point.light, start, n, d, gone, density)
             color += limited(integrator, beta * own_light * weight, depth)
         if depth >= i64_at(integrator, DEPTH):
             break
 
         # Look for a light.
-        own = nested(draws, depth)
         frame = frame_of(point)
         wo = into(frame, -d)
-        t_min = first_step(math.nan, point.p, hit.t)
         if light_count(world) > 0:
-            direct = direct_light(world, point, frame, wo, t_min, own)
+            direct = direct_light(world, point, frame, wo, t_min, nest, bands, own)
             rays += direct.rays
             color += limited(integrator, beta * direct.color, depth + 1)
 
@@ -94,59 +151,64 @@ def path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Ra
         way, choice = pair(own, WAY), pair(own, CHOICE)
         chosen = sample_bsdf(point.material, point.where, wo, way.u, way.v, choice.u)
         beta = beta * chosen.weight
-        density = chosen.density
-        odds = 1.0
-        if depth >= i64_at(integrator, ROULETTE_DEPTH):
-            odds = min(max3(beta), LONGEST_ODDS)
-        if max3(beta) <= 0.0 or choice.v >= odds:
+        odds = survival(integrator, beta, event)
+        if choice.v >= odds:
             break
         beta = beta / odds
-        o, d = point.p, out_of(frame, chosen.wi)
+        passes = wo.z * chosen.wi.z < 0.0
+        d = on_true_side(point, d, out_of(frame, chosen.wi), passes)
+        if passes:
+            nest = crossing(world, nest, point, d)
+        beam = onward(beam, hit.t, chosen.density)
+        o, start, n, density, gone = point.p, point.p, lit_normal(point), chosen.density, 0.0
         depth += 1
     return Radiance(color, rays)
 
 
 @kernel
-def direct_light(world: Table, point: Point, frame: Frame, wo: Vec3, t_min: f64, own: Draws) -> Radiance:
-    """Light from one light, chosen evenly, at one of its points, over the probability of that choice."""
-    count = light_count(world)
-    which, place = pair(own, LIGHT), pair(own, PLACE)
-    light = light_at(world, min(count - 1, int(which.u * count)))
-    parts = cells(light)
-    cell = min(parts - 1, int(which.v * parts))
-    sample = illuminate(light, point.p, cell, place.u, place.v)
-    answer = bsdf(point.material, point.where, wo, into(frame, sample.direction))
-    found = answer.value * sample.irradiance * float(count * parts)
-    if max3(found) <= 0.0:
-        return Radiance(grey(0.0), 0)
-    if is_blocked(world, point.p, sample.direction, t_min, sample.distance - t_min):
-        return Radiance(grey(0.0), 1)
-    p = direction_density(light, point.p, sample.direction, sample.distance) / count
-    if p > 0.0:
-        found = found * power_heuristic(p, answer.density)
-    return Radiance(found, 1)
-
-
-@kernel
-def chance_weight(world: Table, light: i64, o: Vec3, d: Vec3, t: f64, density: f64) -> f64:
-    """Weight of light that a ray met by chance: 1 unless next-event estimation could have found it too."""
-    if light < 0 or density <= 0.0:
+def survival(integrator: Table, beta: Vec3, event: i64) -> f64:
+    """Probability with which a walk goes on: 1 in the beginning, later by what it still weighs."""
+    if max4(beta) <= 0.0:
+        return 0.0
+    if event <= i64_at(integrator, ROULETTE_DEPTH):
         return 1.0
-    q = direction_density(light_at(world, light), o, d, t) / light_count(world)
-    return power_heuristic(density, q)
+    return min(max4(beta), LONGEST_ODDS)
 
 
 @kernel
-def power_heuristic(p: f64, q: f64) -> f64:
-    """Weight of a sample chosen with density p, where another strategy has density q."""
-    return p * p / (p * p + q * q)
+def darkened(point: Point, o: Vec3, d: Vec3, t: f64, bands: Table, own: Draws) -> Vec3:
+    """What is left of light that came from within a body which the path has not entered: the eye is inside of it."""
+    inside = interior(point.material)
+    if is_null(inside):
+        return grey(1.0)
+    return transmittance(inside, o, d, t, bands, nested(own, MEDIUM))
+
+
+@kernel
+def on_true_side(point: Point, d: Vec3, way: Vec3, passes: bool) -> Vec3:
+    """A direction moved to the side of the true surface that it is meant for.
+
+    Where the shading normal differs from the true one, light that was reflected by the one may point into the other.
+    Mirrored in the true surface it stays outside: nothing leaks through, and no dark fringe is left.
+    """
+    facing = dot(point.normal, way)
+    if (facing * dot(point.normal, d) > 0.0) == passes:
+        return way
+    return way - point.normal * (2.0 * facing)
+
+
+@kernel
+def onward(beam: Beam, t: f64, density: f64) -> Beam:
+    """The beam after a surface: mirrors keep it narrow, rough surfaces spread it as wide as their lobe is."""
+    spread = beam.spread if density <= 0.0 else min(WIDEST, max(beam.spread, LOBE / math.sqrt(density)))
+    return Beam(beam.width + beam.spread * t, spread, beam.bands)
 
 
 @kernel
 def limited(integrator: Table, color: Vec3, depth: i64) -> Vec3:
     """A contribution, scaled down to the clamp if one is set; what is seen directly is never touched."""
     most = f64_at(integrator, CLAMP)
-    brightest = max3(color)
+    brightest = max4(color)
     if most == most and depth > 1 and brightest > most:
         return color * (most / brightest)
     return color

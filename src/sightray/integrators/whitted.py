@@ -28,7 +28,18 @@ from sightray.lights.base import cells, illuminate
 from sightray.materials.base import BLINN, Local, local
 from sightray.mathlib.frame import reflect, refract
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_put, scratch, vec3_at, vec3_put
+from sightray.mathlib.table import (
+    Table,
+    advance,
+    f64_at,
+    f64_put,
+    i64_at,
+    i64_put,
+    no_table,
+    scratch,
+    vec3_at,
+    vec3_put,
+)
 from sightray.mathlib.vec import Vec3, dot, grey, max3, normalize, vexp
 from sightray.samplers.base import Draws, nested, pair
 from sightray.scene.world import AMBIENT as WORLD_AMBIENT
@@ -111,7 +122,7 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) ->
             continue
 
         # Light the point where it is seen; light lost inside glass on the way dims all that follows.
-        point = point_of(world, hit, o, d, sight_beam(world))
+        point = point_of(world, hit, o, d, sight_beam(world, no_table()))
         if i64_at(integrator, TWO_SIDED) != 0:
             point = on_seen_side(point, d)
         terms = local(point.material, point.where, point.cos_view)

@@ -70,7 +70,8 @@ class Material(Member, family="materials"):
     What a material is beside a plain surface is stated for the compiler, which spares the others the question:
     `cutout` (it has holes: `opacity`), `bumpy` (it bends normals: `bent_normal`), `oriented` (its answers depend on
     the direction of the tangent, so the frame's x must be along it), `clear` (light passes straight through, as
-    through the bare boundary of a fog: shadow rays go on behind it).
+    through the bare boundary of a fog: shadow rays go on behind it), `thin` (a sheet: light that passes is inside of
+    nothing), `translucent` (light from behind shows: `bsdf` is not zero across the surface).
     """
 
     @property
@@ -89,8 +90,23 @@ class Material(Member, family="materials"):
         return False
 
     @property
+    def glow(self) -> float:
+        """About how much radiance it gives off, mean of its colours: for choosing among lamps; 0 if it is dark."""
+        return 0.0
+
+    @property
     def clear(self) -> bool:
         """Whether light passes straight through."""
+        return False
+
+    @property
+    def translucent(self) -> bool:
+        """Whether light from behind counts in `bsdf`."""
+        return False
+
+    @property
+    def thin(self) -> bool:
+        """Whether it is a sheet with the same medium on both sides, such as a pane or a leaf."""
         return False
 
 

@@ -13,8 +13,8 @@ from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, f64_put, is_null, vec3_at
 from sightray.mathlib.vec import Vec3, grey
 
-WAVELENGTHS, RED, GREEN, BLUE, WHITE, SINGLE = 0, 4, 8, 12, 16, 20
-BANDS_WORDS = 24
+WAVELENGTHS, RED, GREEN, BLUE, WHITE, SEEN, SINGLE = 0, 4, 8, 12, 16, 20, 32  # SEEN: what each lane adds to R, G, B
+BANDS_WORDS = 33
 
 
 @kernel

@@ -67,9 +67,9 @@ def thin_beam() -> Beam:
 
 
 @kernel
-def sight_beam(world: Table) -> Beam:
+def sight_beam(world: Table, bands: Table) -> Beam:
     """A ray of sight, as wide as the camera's pixels."""
-    return Beam(0.0, f64_at(table_at(world, CAMERA), SPREAD), no_table())
+    return Beam(0.0, f64_at(table_at(world, CAMERA), SPREAD), bands)
 
 
 @kernel

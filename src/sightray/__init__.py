@@ -10,15 +10,15 @@
 >>> sr.render(scene, samples=4)
 <Image width=64 height=48 ...>
 
-Nouns are classes, verbs are functions: `load`, `render`, `explain`. Every class of every family (shapes, materials,
-textures, lights, cameras, integrators, filters) is found here by its name.
+Nouns are classes, verbs are functions: `load`, `render`, `label`, `explain`. Every class of every family (shapes, materials,
+textures, lights, cameras, integrators, filters, label layers) is found here by its name.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-_VERBS = ("load", "render", "explain", "save")
+_VERBS = ("load", "render", "label", "explain", "save", "denoise")
 _NOUNS = {
     "Image": "sightray.images",
     "load_image": "sightray.images",
@@ -27,6 +27,7 @@ _NOUNS = {
     "Group": "sightray.scene.instance",
     "Instance": "sightray.scene.instance",
     "Progress": "sightray.engine.progress",
+    "Labels": "sightray.vision.labels",
     "Spectrum": "sightray.spectra",
     "RefractiveIndex": "sightray.spectra",
     "ComplexIndex": "sightray.spectra",
@@ -46,6 +47,8 @@ _PUBLIC_FAMILIES = (
     "samplers",
     "media",
     "accelerators",
+    "vision.layers",
+    "vision.writers",
 )
 
 
@@ -57,8 +60,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(importlib.import_module("sightray.api"), name)
     elif name in _NOUNS:
         value = getattr(importlib.import_module(_NOUNS[name]), name)
-    elif name == "spectra":
-        value = importlib.import_module("sightray.spectra")
+    elif name in ("spectra", "vision"):
+        value = importlib.import_module(f"sightray.{name}")
     elif name[0].isupper():
         value = _member(name)
     else:
@@ -81,4 +84,5 @@ def _member(name: str) -> Any:
 def __dir__() -> list[str]:
     from sightray.registry import members
 
-    return sorted({*_VERBS, *_NOUNS, "spectra", *(name for family in _PUBLIC_FAMILIES for name in members(family))})
+    named = {name for family in _PUBLIC_FAMILIES for name in members(family)}
+    return sorted({*_VERBS, *_NOUNS, "spectra", "vision", *named})

@@ -38,6 +38,8 @@ FAMILIES = (
     "media",
     "scene",
     "accelerators",
+    "vision.layers",
+    "vision.writers",
 )
 _members: dict[str, dict[str, type[Member]]] = {name: {} for name in FAMILIES}
 

@@ -11,8 +11,9 @@ from format_examples import assert_same, image_with_a_light_top_left, points, sh
 
 from sightray.errors import FormatError, UnsupportedError
 from sightray.formats import load_scene
-from sightray.materials.glass import Glass
-from sightray.materials.lambert import Lambert
+from sightray.materials.cutout import Cutout
+from sightray.materials.normal_map import NormalMap
+from sightray.materials.principled import Principled
 from sightray.scene.instance import Instance
 
 write = format_examples.write
@@ -54,7 +55,7 @@ def test_glb_keeps_textures_nodes_and_instances(tmp_path):
     meshes = {part.of if isinstance(part, Instance) else part for part in shapes(loaded)}
     for mesh in meshes:
         assert np.allclose(mesh.uvs, SQUARE[:, :2])  # v upwards again, as trimesh has it
-        assert mesh.material.albedo.pixels[0, 0].tolist() == [1, 1, 1]
+        assert mesh.material.base_color.pixels[0, 0].tolist() == [1, 1, 1]
     assert sorted(part.transform.matrix[0, 3] for part in shapes(loaded)) == [0, 5]
 
 
@@ -99,20 +100,74 @@ def test_gltf_sparse_accessors_and_nodes_by_matrix_and_by_parts(write):
         load_scene(gltf(write, tree, [SQUARE[:3], index, value]))
 
 
-def test_gltf_materials(write):
-    def materials(base):
-        return [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 1]}, "emissiveFactor": [1, 0, 0],
-                 "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 5}}},
-                {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
-                                "KHR_materials_ior": {"ior": 1.4}}},
-                {"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}}]  # fmt: skip
+def materials_of(write, *materials, **tree):
+    """The materials of a file with one triangle of each."""
+    meshes = [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": i}
+                              for i in range(len(materials))]}]  # fmt: skip
+    path = gltf(write, {"materials": list(materials), "meshes": meshes, **tree}, [SQUARE[:3], SQUARE[:3, :2].copy()])
+    return [mesh.material for mesh in shapes(load_scene(path))]
 
-    meshes = [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(3)]}]
-    path = gltf(write, {"materials": materials, "meshes": meshes}, [SQUARE[:3]])
-    matte, clear, mirror = (mesh.material for mesh in shapes(load_scene(path)))
-    assert_same(matte, Lambert(albedo=(0.5, 0.25, 1), emission=(5, 0, 0)))
-    assert_same(clear, Glass(ior=1.4))
-    assert mirror.reflectance == (1, 1, 1)
+
+def extensions(**named):
+    return {"extensions": {f"KHR_materials_{name}": value for name, value in named.items()}}
+
+
+def test_gltf_materials(write):
+    matte, bare, glass, pane, cloth = materials_of(
+        write,
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 1], "metallicFactor": 0},
+         "emissiveFactor": [1, 0, 0], **extensions(emissive_strength={"emissiveStrength": 5}, ior={"ior": 1.4})},
+        {},
+        {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.1}, **extensions(
+            transmission={"transmissionFactor": 1},
+            volume={"thicknessFactor": 1, "attenuationDistance": 0.5, "attenuationColor": [1, math.exp(-1), 1]})},
+        extensions(transmission={"transmissionFactor": 0.5}),
+        extensions(sheen={"sheenColorFactor": [1, 0, 0], "sheenRoughnessFactor": 0.7}, specular={"specularFactor": 0.5},
+                   clearcoat={"clearcoatFactor": 0.8, "clearcoatRoughnessFactor": 0.2}),
+    )  # fmt: skip
+    common = {"thin_walled": True, "roughness": 1, "metallic": 1, "base_color": 1}
+    assert_same(matte, Principled(**{**common, "base_color": (0.5, 0.25, 1), "metallic": 0}, ior=1.4, emission=(5, 0, 0)))
+    assert_same(bare, Principled(**common))  # what is not stated is rough white metal, says the specification
+    assert (glass.transmission, glass.thin_walled) == ((1,) * 3, False)
+    assert (glass.metallic, glass.roughness) == ((0,) * 3, (0.1,) * 3)
+    assert glass.absorption == pytest.approx((0, 2, 0))
+    assert (pane.transmission, pane.thin_walled) == ((0.5,) * 3, True)
+    assert (cloth.sheen, cloth.sheen_roughness, cloth.specular) == ((1, 0, 0), (0.7,) * 3, (0.5,) * 3)
+    assert (cloth.clearcoat, cloth.clearcoat_roughness) == ((0.8,) * 3, (0.2,) * 3)
+
+
+def test_gltf_textures_go_where_they_belong(write, tmp_path):
+    from PIL import Image
+
+    pixels = np.zeros((2, 2, 4), np.uint8)
+    pixels[0, 0] = 51, 102, 204, 128  # top left
+    Image.fromarray(pixels).save(tmp_path / "p.png")
+    of = {"index": 0}
+    pbr = {"baseColorTexture": of, "metallicRoughnessTexture": of, "metallicFactor": 0.5, "roughnessFactor": 1}
+    textures = {"images": [{"uri": "p.png"}], "textures": [{"source": 0, "sampler": 0}],
+                "samplers": [{"magFilter": 9728, "wrapS": 33071}]}  # fmt: skip
+    plain, masked, blended, bumpy = materials_of(
+        write, {"pbrMetallicRoughness": pbr}, {"pbrMetallicRoughness": pbr, "alphaMode": "MASK", "alphaCutoff": 0.3},
+        {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "alphaMode": "BLEND"},
+        {"normalTexture": {**of, "scale": 0.5}, "emissiveTexture": of, "emissiveFactor": [1, 2, 4]}, **textures,
+    )  # fmt: skip
+
+    def top_left(texture):
+        return texture.pixels[0, 0].tolist()
+
+    assert isinstance(plain, Principled)
+    assert top_left(plain.base_color) == pytest.approx([0.0331, 0.1329, 0.6038], abs=1e-4)  # colours are sRGB,
+    assert top_left(plain.roughness)[0] == pytest.approx(0.4)  # numbers are not
+    assert top_left(plain.metallic)[0] == pytest.approx(0.4)
+    assert (plain.base_color.filter, plain.base_color.wrap) == ("nearest", "clamp")
+    assert isinstance(masked, Cutout)
+    assert masked.threshold == 0.3
+    assert top_left(masked.opacity)[0] == pytest.approx(128 / 255)
+    assert (blended.opacity, blended.threshold) == ((0.25,) * 3, None)
+    assert isinstance(bumpy, NormalMap)
+    assert bumpy.strength == 0.5
+    assert top_left(bumpy.map) == pytest.approx([0.2, 0.4, 0.8])
+    assert bumpy.material.emission.b == (1, 2, 4)
 
 
 def test_gltf_claims_are_checked_before_memory_is_taken(write):

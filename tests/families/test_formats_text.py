@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from format_examples import assert_same, points, shapes
 
+import sightray as sr
 from sightray.errors import FormatError, UnsupportedError
 from sightray.formats import load_scene
 from sightray.materials.glass import Glass
@@ -131,15 +132,56 @@ def test_course_without_camera_or_with_an_impossible_one(write):
         course(write, "", head="size 4 4\ncamera 1 1 1 1 1 1 0 1 0 30\n")
 
 
-def test_course_continuation_takes_what_is_done_and_names_what_is_not(write):
-    done = ("integrator raytracer\nlightsamples 1\nlightstratify off\nnexteventestimation off\nrussianroulette off\n"
-            "brdf phong\ngamma 1\n")  # fmt: skip
-    assert course(write, done).integrator.max_depth == 5
-    for line in ("integrator pathtracer", "lightsamples 9", "lightstratify on", "nexteventestimation mis",
-                 "russianroulette on", "importancesampling cosine", "brdf ggx", "roughness 0.3", "gamma 2.2",
-                 "maxdepth -1"):  # fmt: skip
-        with pytest.raises(UnsupportedError, match=f":3: {line}"):
-            course(write, line)
+def test_course_continuation_chooses_integrators(write):
+    assert isinstance(course(write, "lightsamples 5\nrussianroulette on\n").integrator, sr.Whitted)
+    assert isinstance(course(write, "integrator analyticdirect\n").integrator, sr.AnalyticDirect)
+    direct = course(write, "lightsamples 5\nmaxdepth -1\nintegrator direct\nspp 3\ngamma 2.2\n")
+    assert repr(direct.integrator) == "DirectLighting(strategy='light', light_samples=5, max_depth=0)"
+    assert (direct.samples, direct.transfer) == (3, "gamma2.2")
+    walk = course(write, "integrator pathtracer\nnexteventestimation mis\nimportancesampling BRDF\nrussianroulette on\n"
+                         "lightsamples 4\nmaxdepth -1\n").integrator  # fmt: skip
+    assert walk.values() == {"next_event_estimation": "mis", "importance_sampling": "brdf", "russian_roulette": True,
+                             "light_samples": 4, "max_depth": -1}  # fmt: skip
+    assert repr(course(write, "integrator pathtracer\n").integrator) == "CoursePathTracer()"
+
+
+def test_course_continuation_makes_materials_and_lights(write):
+    body = ("quadLight 0 3 0 1 0 0 0 0 1 5 5 5\ndiffuse .1 .2 .3\nspecular .5 .5 .5\nshininess 9\nsphere 0 0 0 1\n"
+            "brdf ggx\nroughness 0.3\nsphere 0 0 0 1\nlightsamples 9\nlightstratify {}\nintegrator {}\n")  # fmt: skip
+    light, phong, ggx = course(write, body.format("on", "direct")).objects
+    assert light.grid == 3
+    assert light.area_vector().tolist() == [0, 1, 0]  # -(ab x ac), with ab = x and ac = z
+    assert (phong.material.mirror, phong.material.shininess) == ((0, 0, 0), 9)
+    assert (ggx.material.roughness, ggx.material.specular) == (0.3, (0.5, 0.5, 0.5))
+    light, phong, ggx = course(write, body.format("off", "pathtracer")).objects
+    assert light.grid == 1
+    light, phong, ggx = course(write, body.format("off", "raytracer")).objects
+    assert light.grid == sr.RectangleLight(corner=(0, 0, 0), edge_u=(1, 0, 0), edge_v=(0, 1, 0)).grid
+    assert phong.material.mirror == (0.5, 0.5, 0.5)
+    light, phong, ggx = course(write, body.format("off", "analyticdirect")).objects
+    np.testing.assert_allclose(phong.material.diffuse, np.array([0.1, 0.2, 0.3]) / np.pi)
+    assert phong.material is not ggx.material
+
+
+@pytest.mark.parametrize(
+    ("line", "error", "message"),
+    [
+        ("maxdepth -1", UnsupportedError, ":3: maxdepth -1; allowed for integrator raytracer: 0 to 200"),
+        ("integrator pathtracer\nmaxdepth 1001", UnsupportedError, ":4: maxdepth 1001; allowed for integrator pathtracer"),
+        ("gamma 1.8", UnsupportedError, ":3: gamma 1.8; allowed: 1 and 2.2"),
+        ("lightsamples 0", FormatError, ":3: lightsamples: got 0; expected 1 to 4096"),
+        ("lightsamples 2.5", FormatError, ":3: lightsamples"),
+        ("roughness 0", FormatError, ":3: roughness: got 0; expected a number above 0, at most 1"),
+        ("brdf", FormatError, ":3: brdf: got 0 words; expected 1"),
+        ("lightstratify yes", FormatError, ":3: unknown choice of lightstratify 'yes'"),
+        ("integrator direct\nlightstratify on\nlightsamples 5\nquadLight 0 3 0 1 0 0 0 0 1 5 5 5", FormatError,
+         ":5: lightsamples: got 5; expected a square number"),
+    ],
+)  # fmt: skip
+def test_course_continuation_mistakes(write, line, error, message):
+    with pytest.raises(error) as caught:
+        course(write, line)
+    assert message in str(caught.value)
 
 
 NFF = """\

@@ -7,12 +7,14 @@ import pytest
 from format_examples import assert_same, points
 
 import sightray.fields as fields
+from sightray.cameras.fisheye import FisheyeCamera
 from sightray.errors import FormatError, SceneError
 from sightray.formats import load_scene, save_scene
 from sightray.materials.glass import Glass
 from sightray.materials.lambert import Lambert
 from sightray.materials.phong import Phong
 from sightray.mathlib.transform import Transform
+from sightray.media.homogeneous import HomogeneousMedium
 from sightray.registry import members
 from sightray.scene.instance import Group, Instance
 from sightray.scene.scene import Scene
@@ -33,7 +35,7 @@ def candidate(field):
     if isinstance(field, fields.Integer):
         return next(n for n in (3, 5, 7) if n != field.default)
     if isinstance(field, fields.Number):
-        return next(n for n in (0.3, 1.1, 60.0) if all(b is None or fields._COMPARE[s](n, b) for b, s in field.bounds))
+        return next(n for n in (0.3, 1.1, 60.0, 7.0) if all(b is None or fields._COMPARE[s](n, b) for b, s in field.bounds))
     if isinstance(field, fields.ColorField):
         return (0.1, 1 / 3, 0.7)
     if isinstance(field, fields.Vector):
@@ -42,21 +44,33 @@ def candidate(field):
     if isinstance(field, fields.Text):
         return "yes: 'no' # 1e3"
     if isinstance(field, fields.Child):
-        return {"materials": Lambert(albedo=0.25), "textures": Checker(scale=3)}.get(field.family)
+        return {"materials": Lambert(albedo=0.25), "textures": Checker(scale=3),
+                "media": HomogeneousMedium(scattering=2)}.get(field.family)  # fmt: skip
     if field.name == "transform":
         return Transform.translate(0.1, 2, 3) @ Transform.rotate((1, 2, 3), 40) @ Transform.scale(1, 1 / 3, 2)
     return None
 
 
+AIM = {"eye": (1, 2, 3), "target": (0, 0, 1 / 3)}
+MOTION = [(-0.5, Transform.scale(2)), (1 / 3, Transform.translate(0.1, 2, 3) @ Transform.rotate((1, 2, 3), 40))]
 GIVEN = {
     "Mesh": {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1 / 3, 0]], "faces": [[0, 1, 2]], "uvs": [[0, 0], [1, 0], [0, 1]]},
     "PointCloud": {"points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.1], [0.5, 0.5, 0]], "radius": 0.8},
     "Polygon": {"outline": [[0, 0, 0], [3, 0, 0], [0, 3, 0]], "holes": [[[0.1, 0.1, 0], [1, 0.1, 0], [0.1, 1, 0]]]},
     "Implicit": {"expression": "x**2 + y**2 + z**2 - 1", "function": None},
     "Bitmap": {"image": np.linspace(0, 1, 24).reshape(2, 4, 3), "scale": (2, 0.5), "offset": (0.25, 0)},
+    "EnvironmentLight": {"image": np.linspace(0, 1, 24).reshape(2, 4, 3), "transform": Transform.rotate((1, 2, 3), 40)},
+    "ProjectorLight": {"image": np.linspace(0, 1, 300).reshape(10, 10, 3)},
+    "SunSky": {"direction": (1, 0.1, 0.3)},
+    "Subsurface": {"preset": "whole milk"},
+    "Conductor": {"metal": "Cu"},
     "WindowCamera": {"left": -0.5, "bottom": -0.5},
-    "Group": {"objects": [Sphere(radius=2)]},
-    "Instance": {"of": Sphere(radius=3)},
+    "Gradient": {"colors": [[0, 1, 0], [2, 0, 1 / 3], [0, 0, 0]], "places": [0, 0.1, 0.9], "end": 2.5},
+    "SpectralColor": {"wavelengths": [400, 500.5, 700], "reflectances": [0.1, 1 / 3, 0.9]},
+    "UvTransform": {"scale": (2, 1 / 3), "offset": (0.25, 0)},
+    "MovingCamera": {"camera": FisheyeCamera(fov=150, readout=0.1), "poses": [(0, np.eye(4)), (1, {**AIM, "roll": 20})]},
+    "Group": {"objects": [Sphere(radius=2)], "motion": MOTION},
+    "Instance": {"of": Sphere(radius=3), "motion": MOTION},
 }
 
 

@@ -11,19 +11,28 @@ from scipy import stats
 from sightray._jit import kernel, native
 from sightray.errors import SceneError
 from sightray.lights.area import _AreaLight
-from sightray.lights.base import cells, illuminate
+from sightray.lights.base import cells, direction_density, illuminate, sky
 from sightray.lights.directional import DirectionalLight
 from sightray.lights.disk import DiskLight, concentric
+from sightray.lights.environment import EnvironmentLight
 from sightray.lights.point import PointLight
+from sightray.lights.projector import ProjectorLight
 from sightray.lights.rectangle import RectangleLight
 from sightray.lights.sphere import SphereLight
 from sightray.lights.spot import SpotLight
+from sightray.lights.sunsky import SunSky
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put, vec3_at, vec3_put
+from sightray.mathlib.transform import Transform
+from sightray.mathlib.vec import Vec3
 from sightray.registry import members
 from sightray.scene.compile import Tables
 from sightray.shapes.base import intersect
 
+PICTURE = np.random.default_rng(5).uniform(0, 1, (9, 14, 3)) ** 4
+PICTURE[2, 3] = 30
+PICTURE[5:7, 8:11] = 0
+TURN = Transform.rotate((1, 2, -0.5), 70)
 SLANTED = {"corner": (-1, 3, 0.5), "edge_u": (2, 0.3, 0), "edge_v": (0.5, 0.2, 2)}
 EXAMPLES = {
     "PointLight": [PointLight(position=(1, 2, 3)), PointLight(position=(0, 0, 9), attenuation=(1, 0.5, 0.1))],
@@ -32,15 +41,32 @@ EXAMPLES = {
         SpotLight(position=(0, 3, 0), target=(0, 0, 0), angle=90, blend=0.5),
         SpotLight(position=(1, 1, 1), target=(-1, 0, 0), angle=180, blend=0, intensity=(3, 2, 1)),
     ],
-    "RectangleLight": [RectangleLight(**SLANTED, grid=3), RectangleLight(**SLANTED, radiance=2, two_sided=True)],
+    "RectangleLight": [
+        RectangleLight(**SLANTED, grid=3),
+        RectangleLight(**SLANTED, radiance=2, two_sided=True),
+        RectangleLight(corner=(-2, 1, -1), edge_u=(4, 0, 1), edge_v=(0, 3, 0), two_sided=True),
+    ],
     "DiskLight": [
         DiskLight(center=(0, 2, 0), radius=0.7),
         DiskLight(center=(1, 2, 3), normal=(-1, -3, 2), two_sided=True, grid=5, radiance=(3, 0, 1)),
     ],
     "SphereLight": [SphereLight(center=(0, 2, 0)), SphereLight(center=(3, -1, 2), radius=1.7, grid=7)],
+    "EnvironmentLight": [
+        EnvironmentLight(radiance=(1, 0.5, 2)),
+        EnvironmentLight(image=PICTURE, radiance=0.5, transform=TURN, grid=3),
+    ],
+    "SunSky": [
+        SunSky(scale=0.01, sun_radius=6, ground=(0.1, 0.3, 0.2)),
+        SunSky(time="2024-06-21T15:30+02:00", latitude=52.5, longitude=13.4, turbidity=6, sky_scale=0.5, grid=2),
+    ],
+    "ProjectorLight": [
+        ProjectorLight(image=PICTURE, eye=(0, 8, 1), vfov=80),
+        ProjectorLight(image=PICTURE[:, :, :1], eye=(7, 1, 2), vfov=120, filter="nearest", intensity=(3, 2, 1)),
+    ],
 }
 EVERY = [pytest.param(x, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() for i, x in enumerate(all_of)]
 AREA = [p for p in EVERY if isinstance(p.values[0], _AreaLight)]
+SKIES = [p for p in EVERY if p.values[0].infinite]
 
 
 @kernel
@@ -72,6 +98,16 @@ def samples_of(light, points: np.ndarray, compiled: bool = True) -> tuple[int, n
     out = np.zeros((len(points), 8))
     total = (native(ask) if compiled else ask)(row, len(points), Table(points), Table(out))
     return total, out
+
+
+def met(shape, samples: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distances at which rays from the points in the samples' directions meet a shape."""
+    tables = Tables()
+    row = tables.row_of(shape)
+    tables.prepare(meet)
+    distances = np.zeros(len(points))
+    native(meet)(row, len(points), Table(samples), Table(points), Table(distances))
+    return distances
 
 
 def random_points(count: int = 200, seed: int = 0, spread: float = 6.0) -> np.ndarray:
@@ -114,18 +150,96 @@ def test_directions_are_unit_and_light_is_finite_and_not_negative(light):
 
 @pytest.mark.parametrize("light", EVERY)
 def test_light_is_proportional_to_its_colour(light):
-    (name,) = {"intensity", "irradiance", "radiance"} & set(light.fields)
+    (name,) = {"intensity", "irradiance", "radiance", "scale"} & set(light.fields)
     points = random_points()
     white = samples_of(light.replace(**{name: 1}), points)[1][:, 4:7]
     coloured = samples_of(light.replace(**{name: (0, 0.5, 40)}), points)[1][:, 4:7]
-    np.testing.assert_allclose(coloured, white * (0, 0.5, 40), rtol=1e-14)
+    np.testing.assert_allclose(coloured, white * (0, 0.5, 40), rtol=1e-12)
 
 
 @pytest.mark.parametrize("light", EVERY)
 def test_plain_values_make_the_same_light(light):
     plain = {name: light.fields[name].plain(value) for name, value in light.values().items()}
-    assert type(light)(**plain).values() == light.values()
+    if "image" in plain and plain["image"] is not None:
+        plain["image"] = np.asarray(plain["image"], float)
+    again = type(light)(**plain).values()
+    for name, value in light.values().items():
+        assert np.array_equal(again[name], value)
     assert repr(light.replace()) == repr(light)
+
+
+@kernel
+def densities(light: Table, count: i64, points: Table, samples: Table, out: Table) -> i64:
+    """Radiance of the sky in the samples' directions, and with which density `illuminate` chooses them."""
+    for i in range(count):
+        p, d = vec3_at(points, 8 * i), vec3_at(samples, 8 * i)
+        vec3_put(out, 4 * i, sky(light, Vec3(d.x, d.y, d.z)))
+        f64_put(out, 4 * i + 3, direction_density(light, p, d, f64_at(samples, 8 * i + 3)))
+    return count
+
+
+def radiance_and_density(light, points: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    """(n, 4): radiance of the sky, and density of the directions of `samples`, as `samples_of` gives them."""
+    tables = Tables()
+    row = tables.row_of(light)
+    tables.prepare(densities)
+    out = np.zeros((len(points), 4))
+    native(densities)(row, len(points), Table(points), Table(samples), Table(out))
+    return out
+
+
+@pytest.mark.parametrize("light", AREA + SKIES)
+def test_what_arrives_is_radiance_over_density(light):
+    points = random_points(2000)
+    total, samples = samples_of(light, points)
+    found = radiance_and_density(light, points, samples)
+    radiance = found[:, :3] if light.infinite else np.broadcast_to(light.radiance, (len(points), 3))
+    lit = samples[:, 4:7].any(axis=1)
+    assert lit.sum() > 200
+    np.testing.assert_allclose((samples[:, 4:7] * total * found[:, 3:])[lit], radiance[lit], rtol=1e-6, atol=1e-9)
+
+
+SAMPLED = [pytest.param(*p.values, q, id=f"{p.id}-{k}") for p in AREA + SKIES
+           for k, q in enumerate([(0.1, 0.5, -0.2), (2.5, 1.1, 0.7)])
+           if p.id != "SunSky-1" and (p.values[0].infinite or k == 0 or p.id != "SphereLight-1")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("light", "p"), SAMPLED)
+def test_directions_follow_their_density_by_a_chi_square_test(light, p):
+    """Counts of sampled directions in 200 pieces of the sphere, against the mean density over random directions."""
+    count = 400_000
+    points = random_points(count, seed=3)
+    points[:, :3] = p
+    samples = samples_of(light, points)[1]
+
+    rng = np.random.default_rng(4)
+    even = np.zeros((4 * count, 8))
+    even[:, :3] = rng.normal(size=(len(even), 3))
+    even[:, :3] /= np.linalg.norm(even[:, :3], axis=1, keepdims=True)
+    even[:, 3] = np.inf
+    around = np.zeros((len(even), 8))
+    around[:, :3] = p
+    if not light.infinite:
+        even[:, 3] = met(light.shape(), even, around)
+    seen = light.infinite | np.isfinite(even[:, 3])
+    density = np.where(seen, radiance_and_density(light, around, even)[:, 3], 0.0)
+
+    def pieces(d, weights):
+        angle = np.arctan2(d[:, 0], d[:, 2])
+        return np.histogram2d(d[:, 1], angle, (10, 20), ((-1, 1), (-math.pi, math.pi)), weights=weights)[0].ravel()
+
+    share = 4 * math.pi / len(even)
+    found, expected = pieces(samples, np.full(count, 1 / count)), pieces(even, density * share)
+    variance = expected / count + pieces(even, (density * share) ** 2)
+    well_known = expected * count > 30
+    z = ((found - expected) / np.sqrt(np.where(variance > 0, variance, 1)))[well_known]
+    assert 1 - stats.chi2.cdf((z**2).sum(), len(z)) > 1e-4
+    assert found[expected == 0].sum() < 20 / count
+
+    # Over all directions that see the light, densities sum up to 1.
+    whole, error = density.mean() * 4 * math.pi, density.std() * 4 * math.pi / math.sqrt(len(even))
+    assert error < 0.05
+    assert abs(whole - 1) < 4 * error + 1e-9
 
 
 # --- lights with an area -------------------------------------------------------------------------------------------
@@ -135,11 +249,7 @@ def test_plain_values_make_the_same_light(light):
 def test_samples_lie_on_the_shape_that_is_seen(light):
     points = random_points()
     _, samples = samples_of(light, points)
-    tables = Tables()
-    row = tables.row_of(light.shape())
-    tables.prepare(meet)
-    distances = np.zeros(len(points))
-    native(meet)(row, len(points), Table(samples), Table(points), Table(distances))
+    distances = met(light.shape(), samples, points)
     lit = samples[:, 4:7].any(axis=1)
     assert lit.sum() > 20
     np.testing.assert_allclose(distances[lit], samples[lit, 3], rtol=1e-6)
@@ -218,7 +328,7 @@ def test_shirley_chiu_concentric_map_keeps_areas():
 def test_cells_share_the_square_without_overlap():
     light = RectangleLight(corner=(0, 0, 0), edge_u=(4, 0, 0), edge_v=(0, 4, 0), grid=4)
     points = random_points(1600)
-    points[:, :3] = 1, 2, 3
+    points[:, :3] = 1, 2, 30  # so far away that areas count, not solid angles
     total, samples = samples_of(light, points)
     q = points[:, :3] + samples[:, :3] * samples[:, 3:4]
     cell = np.floor(q[:, 0]).astype(int) + 4 * np.floor(q[:, 1]).astype(int)

@@ -45,8 +45,8 @@ def ask(medium: Table, sampler: Table, count: i64, ray: Table, answers: Table) -
     o, d, t_max = vec3_at(ray, 0), vec3_at(ray, 4), f64_at(ray, 8)
     for i in range(count):
         draws = begin(sampler, i, 0, 1, 0, 1)
-        went = sample_distance(medium, o, d, t_max, no_table(), draws)
-        turned = sample_phase(medium, d, f64_at(ray, 9 + 2 * i), f64_at(ray, 10 + 2 * i))
+        went = sample_distance(medium, o, d, t_max, vec3_at(ray, 12), no_table(), draws)
+        turned = sample_phase(medium, d, f64_at(ray, 16 + 2 * i), f64_at(ray, 17 + 2 * i))
         f64_put(answers, 16 * i, went.t)
         f64_put(answers, 16 * i + 1, 1.0 if went.scattered else 0.0)
         vec3_put(answers, 16 * i + 2, went.weight)
@@ -57,14 +57,15 @@ def ask(medium: Table, sampler: Table, count: i64, ray: Table, answers: Table) -
         vec3_put(answers, 16 * i + 12, transmittance(medium, o, d, t_max, no_table(), draws))
 
 
-def asked(medium, t_max, count, compiled=True):
+def asked(medium, t_max, count, compiled=True, beta=(1.0, 1.0, 1.0)):
     tables = Tables()
     row, sampler = tables.row_of(medium), tables.row_of(sr.IndependentSampler())
     tables.prepare(ask, compiled=compiled)
-    ray = np.zeros(9 + 2 * count)
+    ray = np.zeros(16 + 2 * count)
     d = np.array([0.6, -0.64, 0.48])
     ray[:3], ray[4:7], ray[8] = -0.9 * d, d, t_max
-    ray[9:] = np.random.default_rng(0).random(2 * count)
+    ray[12:15] = beta
+    ray[16:] = np.random.default_rng(0).random(2 * count)
     out = np.zeros((count, 16))
     (native(ask) if compiled else ask)(row, sampler, count, tables.space.array(ray), tables.space.array(out))
     return out, ray
@@ -98,20 +99,22 @@ def test_transmittance_is_bouguers_law(medium, t_max):
     assert (np.abs(left - beer(medium, t_max)) <= 4.5 * error + 1e-6).all()
 
 
+@pytest.mark.parametrize("beta", [(1.0, 1.0, 1.0), (0.2, 3.0, 0.01), (0.0, 0.0, 1.0)])
 @pytest.mark.parametrize("t_max", [0.7, 3.0])
 @pytest.mark.parametrize("medium", EVERY)
-def test_distances_carry_the_right_weight(medium, t_max):
+def test_distances_carry_the_right_weight(medium, t_max, beta):
     """What is not scattered weighs the transmittance; what is weighs the rest times the single scattering albedo."""
-    out, _ = asked(medium, t_max, 40_000)
+    out, _ = asked(medium, t_max, 40_000, beta=beta)
+    lanes = np.array(beta) > 0  # one without weight may be missed
     scattered = out[:, 1:2] > 0
     passed, turned = np.where(scattered, 0, out[:, 2:5]), np.where(scattered, out[:, 2:5], 0)
     root = math.sqrt(len(out))
-    assert (np.abs(passed.mean(0) - beer(medium, t_max)) <= 4.5 * passed.std(0) / root + 1e-6).all()
+    assert (np.abs(passed.mean(0) - beer(medium, t_max)) <= 4.5 * passed.std(0) / root + 1e-6)[lanes].all()
     total = np.add(medium.absorption, medium.scattering)
     albedo = np.divide(medium.scattering, total, out=np.zeros(3), where=total > 0)
     if max(medium.scattering) > 0 and min(total) > 0:
         expected = (1 - beer(medium, t_max)) * albedo
-        assert (np.abs(turned.mean(0) - expected) <= 4.5 * turned.std(0) / root + 1e-6).all()
+        assert (np.abs(turned.mean(0) - expected) <= 4.5 * turned.std(0) / root + 1e-6)[lanes].all()
     assert (out[scattered[:, 0], 0] < t_max).all()
 
 

@@ -8,20 +8,32 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import sightray as sr
+from sightray import spectra
 from sightray._jit import kernel, native
 from sightray.errors import FormatError, SceneError
 from sightray.images import Image
+from sightray.mathlib.bands import BANDS_WORDS, BLUE, GREEN, RED, WAVELENGTHS
 from sightray.mathlib.scalars import i64
-from sightray.mathlib.table import Table, f64_at, vec3_at, vec3_put
+from sightray.mathlib.table import Table, f64_at, no_table, vec3_at, vec3_put
 from sightray.registry import members
 from sightray.scene.compile import Tables
-from sightray.textures.base import anywhere, texture_value
+from sightray.textures.base import Where, texture_value, value_at
 from sightray.textures.bitmap import Bitmap
 from sightray.textures.checker import Checker
 from sightray.textures.constant import Constant
+from sightray.textures.gradient import Gradient
+from sightray.textures.marble import Marble
+from sightray.textures.multiply import Multiply
+from sightray.textures.noise import Noise
+from sightray.textures.pyramid import pyramid
+from sightray.textures.spectralcolor import SpectralColor
+from sightray.textures.triplanar import Triplanar
+from sightray.textures.uvtransform import UvTransform
+from sightray.textures.wood import Wood
 
 COLOURS = np.random.default_rng(5).uniform(0, 2, (3, 4, 3)).astype(np.float32)  # 4 wide, 3 high
-MODES = [(f, w) for f in ("nearest", "bilinear") for w in ("repeat", "clamp", "mirror")]
+MODES = [(f, w) for f in ("nearest", "bilinear", "trilinear") for w in ("repeat", "clamp", "mirror")]
 EXAMPLES = {
     "Constant": [Constant(color=(1, 2, 3))],
     "Checker": [
@@ -30,23 +42,60 @@ EXAMPLES = {
         Checker(mode="solid", scale=0.7, even=Bitmap(image=COLOURS)),
     ],
     "Bitmap": [Bitmap(image=COLOURS, filter=f, wrap=w, scale=(2, -1.5), offset=(0.1, 7)) for f, w in MODES],
+    "Gradient": [
+        Gradient(),
+        Gradient(colors=[(0, 1, 0), (2, 0, 1), (0, 0, 3)], places=[0, 0.2, 0.9], along="z", begin=-1, end=3),
+        Gradient(colors=[(1, 0, 0), (0, 1, 0), (0, 1, 1)], along="v", wrap="repeat", end=-0.7),
+        Gradient(colors=[(1, 1, 0), (0, 1, 0)], along="y", wrap="mirror"),
+    ],
+    "Noise": [
+        Noise(),
+        Noise(mode="uv", turbulence=True, scale=3.1, dark=(1, 0, 0), light=Checker(), seed=7, octaves=3, gain=0.7),
+    ],
+    "Marble": [Marble(), Marble(direction=(1, 2, 3), scale=0.3, fold=1, sharpness=2, light=Bitmap(image=COLOURS))],
+    "Wood": [Wood(), Wood(axis=(1, 0, 2), center=(3, 1, 0), scale=3, waviness=2, grain=1, seed=3)],
+    "Triplanar": [
+        Triplanar(x=Bitmap(image=COLOURS)),
+        Triplanar(x=Bitmap(image=COLOURS), y=(0, 2, 1), z=Checker(scale=5), scale=0.7, sharpness=9),
+    ],
+    "UvTransform": [UvTransform(texture=Bitmap(image=COLOURS), scale=(2, -3), rotate=33, offset=(0.1, 4))],
+    "Multiply": [Multiply(a=Bitmap(image=COLOURS), b=Multiply(a=0.5, b=Checker(scale=3)))],
+    "SpectralColor": [SpectralColor(wavelengths=[400, 500, 600, 700], reflectances=[0.1, 0.7, 0.2, 0.9])],
 }
 EVERY = [pytest.param(t, id=f"{name}-{i}") for name, all_of in EXAMPLES.items() for i, t in enumerate(all_of)]
 
 
 @kernel
 def ask(texture: Table, count: i64, places: Table, colours: Table) -> i64:
-    """`texture_value` at many places, each u, v, p (8 words)."""
+    """`texture_value` at many places, each u, v, p, normal, width (9 of 16 words)."""
     for i in range(count):
-        where = anywhere(f64_at(places, 8 * i), f64_at(places, 8 * i + 1), vec3_at(places, 8 * i + 2))
+        u, v, width = f64_at(places, 16 * i), f64_at(places, 16 * i + 1), f64_at(places, 16 * i + 8)
+        where = Where(u, v, vec3_at(places, 16 * i + 2), vec3_at(places, 16 * i + 5), width, no_table())
         vec3_put(colours, 4 * i, texture_value(texture, where))
     return count
 
 
-def colours_of(texture, places, compiled: bool = True) -> np.ndarray:
-    """(n, 2 or 5) places u, v, x, y, z -> (n, 3) colours."""
-    rows = np.zeros((len(places), 8))
+@kernel
+def ask_spectrally(texture: Table, bands: Table, count: i64, places: Table, lanes: Table) -> i64:
+    """`value_at` at many places, at the wavelengths of `bands`."""
+    for i in range(count):
+        u, v = f64_at(places, 16 * i), f64_at(places, 16 * i + 1)
+        where = Where(u, v, vec3_at(places, 16 * i + 2), vec3_at(places, 16 * i + 5), 0.0, bands)
+        vec3_put(lanes, 4 * i, value_at(texture, where))
+    return count
+
+
+def rows_of(places) -> np.ndarray:
+    """(n, 2 to 9) places u, v, x, y, z, normal, width -> what the kernels read; the normal is +z unless given."""
+    rows = np.zeros((len(places), 16))
+    rows[:, 7] = 1.0
     rows[:, : np.shape(places)[1]] = places
+    return rows
+
+
+def colours_of(texture, places, compiled: bool = True) -> np.ndarray:
+    """(n, 2 to 9) places u, v, x, y, z, normal, width -> (n, 3) colours."""
+    rows = rows_of(places)
     tables = Tables()
     row = tables.row_of(texture)
     tables.prepare(ask, compiled=compiled)
@@ -59,9 +108,17 @@ def test_no_texture_lacks_an_example():
     assert set(EXAMPLES) == {n for n, cls in members("textures").items() if cls.__module__.startswith("sightray.")}
 
 
+def some_places(count: int, seed: int = 0) -> np.ndarray:
+    """(n, 9) places all about, with unit normals and footprints of up to a unit of u."""
+    generator = np.random.default_rng(seed)
+    n = generator.normal(size=(count, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    return np.hstack([generator.uniform(-5, 5, (count, 5)), n, generator.uniform(0, 1, (count, 1))])
+
+
 @pytest.mark.parametrize("texture", EVERY)
 def test_machine_code_answers_as_python_does(texture):
-    places = np.random.default_rng(0).uniform(-5, 5, (100, 5))
+    places = some_places(100)
     expected = colours_of(texture, places, compiled=False)
     assert np.isfinite(expected).all()
     np.testing.assert_allclose(colours_of(texture, places), expected, rtol=1e-12, atol=1e-12)
@@ -70,7 +127,7 @@ def test_machine_code_answers_as_python_does(texture):
 @pytest.mark.parametrize("texture", EVERY)
 @pytest.mark.parametrize("value", [1e300, -1e300, math.inf, math.nan])
 def test_absurd_places_stay_within_the_texture(texture, value):
-    colours_of(texture, np.full((1, 5), value))  # bilinear weights may be NaN there; memory must not be left
+    colours_of(texture, np.full((1, 9), value))  # bilinear weights may be NaN there; memory must not be left
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e19, math.inf, -math.inf, math.nan])
@@ -78,6 +135,64 @@ def test_absurd_places_stay_within_the_texture(texture, value):
 def test_the_nearest_texel_exists_for_any_number(wrap, value):
     found = colours_of(Bitmap(image=COLOURS, filter="nearest", wrap=wrap), [(value, value)])[0]
     assert found.astype(np.float32).tolist() in COLOURS.reshape(-1, 3).tolist()
+
+
+def spectra_of(texture, places, nm, compiled: bool = True) -> np.ndarray:
+    """Four lanes at the wavelengths `nm` for each place, (n, 4)."""
+    rows, tables, out = rows_of(places), Tables(), np.zeros((len(places), 4))
+    words = np.zeros(BANDS_WORDS)
+    words[WAVELENGTHS : WAVELENGTHS + 4] = nm
+    for lane, at in enumerate((RED, GREEN, BLUE)):
+        words[at : at + 4] = [np.interp(x, spectra.WAVELENGTHS, spectra.basis()[:, lane]) for x in nm]
+    row, bands = tables.row_of(texture), tables.space.array(words)
+    tables.prepare(ask_spectrally, compiled=compiled)
+    (native(ask_spectrally) if compiled else ask_spectrally)(row, bands, len(rows), Table(rows), Table(out))
+    return out
+
+
+NM = (420.0, 510.0, 570.0, 690.0)
+
+
+@pytest.mark.parametrize("texture", EVERY)
+def test_a_spectrum_is_that_of_the_colour_where_nothing_else_is_stated(texture):
+    places = some_places(30, 3)
+    places[:, 8] = 0
+    found = spectra_of(texture, places, NM)
+    np.testing.assert_allclose(found, spectra_of(texture, places, NM, compiled=False), rtol=1e-11, atol=1e-12)
+    if isinstance(texture, SpectralColor):
+        np.testing.assert_allclose(found, np.tile(texture.spectrum.at(NM), (30, 1)), rtol=1e-14)
+    elif not isinstance(texture, Multiply):  # a product of spectra is another one than the spectrum of the product
+        basis = np.array([[np.interp(x, spectra.WAVELENGTHS, lane) for x in NM] for lane in spectra.basis().T])
+        np.testing.assert_allclose(found, colours_of(texture, places) @ basis, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("wrap", [
+    lambda t: Checker(even=t, odd=t), lambda t: Noise(dark=t, light=t), lambda t: Triplanar(x=t), lambda t: Multiply(a=t),
+    lambda t: UvTransform(texture=t), lambda t: Wood(dark=t, light=t), lambda t: Marble(dark=t, light=t),
+])  # fmt: skip
+def test_a_measured_colour_keeps_its_spectrum_within_other_textures(wrap):
+    color = SpectralColor(wavelengths=[400, 500, 600, 700], reflectances=[0.1, 0.7, 0.2, 0.9])
+    found = spectra_of(wrap(color), some_places(10), NM)
+    np.testing.assert_allclose(found, np.tile(color.spectrum.at(NM), (10, 1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("texture", EVERY)
+def test_yaml_keeps_every_texture(texture, tmp_path):
+    scene = sr.Scene(sr.Sphere(material=sr.Phong(diffuse=texture)))
+    sr.save(scene, tmp_path / "scene.yaml")
+    again = sr.load(tmp_path / "scene.yaml").objects[0].material.diffuse
+    places = some_places(20, 4)
+    np.testing.assert_array_equal(colours_of(again, places), colours_of(texture, places))
+
+
+def test_a_texture_of_numbers_reads_its_pictures_as_they_are(tmp_path):
+    path = tmp_path / "half.png"
+    Image(np.full((2, 2, 3), 0.5, np.float32)).save(path)  # sRGB: 188
+    texture = Multiply(a=UvTransform(texture=Bitmap(image=path), scale=2), b=0.5)
+    assert abs(colours_of(texture, [(0.5, 0.5)])[0, 0] - 0.25) < 0.002
+    assert abs(colours_of(texture.as_numbers(), [(0.5, 0.5)])[0, 0] - 0.5 * 188 / 255) < 1e-6
+    plain = Checker()
+    assert plain.as_numbers() is plain
 
 
 # --- Checker -------------------------------------------------------------------------------------------------------
@@ -153,6 +268,53 @@ def test_scale_and_offset_move_the_place_that_is_looked_up():
     moved = colours_of(Bitmap(image=COLOURS, scale=(2, -3), offset=(0.25, 0.5)), places)
     np.testing.assert_allclose(moved, colours_of(Bitmap(image=COLOURS), places * (2, -3) + (0.25, 0.5)), atol=1e-12)
     assert Bitmap(image=COLOURS, scale=3).scale == (3.0, 3.0)
+
+
+def areas(picture: np.ndarray, columns: int, rows: int) -> np.ndarray:
+    """Means over a grid of equal parts, by brute force: each texel many times, so that parts hold whole ones."""
+    h, w = picture.shape[:2]
+    fine = picture.astype(float).repeat(rows, axis=0).repeat(columns, axis=1)
+    return fine.reshape(rows, h, columns, w, 3).mean(axis=(1, 3))
+
+
+def test_levels_of_a_pyramid_are_means_over_areas():
+    picture = np.random.default_rng(6).uniform(0, 1, (6, 5, 3))
+    sizes, texels = pyramid(picture)
+    assert sizes.tolist() == [[5, 6, 0], [3, 3, 0], [2, 2, 9], [1, 1, 13]]
+    np.testing.assert_allclose(texels[:9].reshape(3, 3, 3), areas(picture, 3, 3), rtol=1e-6)
+    np.testing.assert_allclose(texels[9:13].reshape(2, 2, 3), areas(texels[:9].reshape(3, 3, 3), 2, 2), rtol=1e-6)
+    np.testing.assert_allclose(texels[13], picture.mean(axis=(0, 1)), rtol=1e-6)
+
+
+def test_trilinear_is_a_mean_over_the_footprint():
+    """On the level whose texels are as wide as the footprint, at the middle of a texel: the mean over just that area."""
+    picture = np.random.default_rng(7).uniform(0, 1, (32, 32, 3)).astype(np.float32)
+    texture = Bitmap(image=picture, filter="trilinear", scale=2)
+    for level in range(6):
+        n = 32 >> level
+        i, j = np.meshgrid(np.arange(n), np.arange(n))
+        places = np.zeros((n * n, 9))
+        places[:, 0], places[:, 1] = (i.ravel() + 0.5) / n / 2, (j.ravel() + 0.5) / n / 2
+        places[:, 7], places[:, 8] = 1, 1 / n / 2  # in units of u, of which a picture has 1/2
+        np.testing.assert_allclose(colours_of(texture, places).reshape(n, n, 3)[::-1], areas(picture, n, n), rtol=1e-5)
+        places[:, 8] *= math.sqrt(2) if level < 5 else 99  # halfway to the next level, or beyond the last
+        found = colours_of(texture, places)
+        assert np.isfinite(found).all()
+        assert found.mean() == pytest.approx(picture.mean(), rel=1e-4)
+    sharp = [(0.1, 0.2, 0, 0, 0, 0, 0, 1, 0.0), (0.1, 0.2, 0, 0, 0, 0, 0, 1, 0.4 / 32)]
+    expected = colours_of(texture.replace(filter="bilinear"), sharp)
+    np.testing.assert_array_equal(colours_of(texture, sharp), expected)
+    assert len(texture.replace(filter="bilinear").levels()[0]) == 1
+    wide = np.tile([0.1, 0.2, 0, 0, 0, 0, 0, 1, 0.07], (1, 1))
+    halved = wide * (2, 2, 1, 1, 1, 1, 1, 1, 2)
+    np.testing.assert_array_equal(colours_of(texture, wide), colours_of(texture.replace(scale=1), halved))
+
+
+def test_trilinear_has_no_jump_where_the_level_changes():
+    texture = Bitmap(image=np.random.default_rng(8).uniform(0, 1, (16, 16, 3)), filter="trilinear")
+    places = np.zeros((4000, 9))
+    places[:, :2], places[:, 8] = (0.37, 0.81), np.geomspace(0.01, 2, 4000)
+    assert np.abs(np.diff(colours_of(texture, places), axis=0)).max() < 0.002
 
 
 def test_one_channel_is_grey_and_alpha_is_ignored():

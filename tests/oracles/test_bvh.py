@@ -11,8 +11,12 @@ import trimesh
 import sightray as sr
 from sightray._jit import kernel, native
 from sightray.accelerators.bvh import any_item, closest_item, pack_items
-from sightray.bvh.binned_sah import Bvh8, build, build_nodes
-from sightray.bvh.bvh8 import CHILDREN, LEAF, MAX_LEVELS, STACK_WORDS
+from sightray.bvh import binned_sah
+from sightray.bvh import collapse as collapsing
+from sightray.bvh.binned_sah import Bvh8, build, divide
+from sightray.bvh.bvh8 import CHILDREN, LEAF, STACK_WORDS
+from sightray.bvh.collapse import COUNT, HALVES, collapse, half_area, plan_ranges
+from sightray.bvh.shadow_order import order_children
 from sightray.bvh.triangles import (
     BLOCKS,
     MESH_WORDS,
@@ -24,6 +28,7 @@ from sightray.bvh.triangles import (
     shear,
 )
 from sightray.mathlib.hit import is_hit, miss
+from sightray.mathlib.lanes import F32x8
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, aligned, f64_at, f64_put, i64_put, table_at
 from sightray.mathlib.vec import Vec3
@@ -256,16 +261,16 @@ def test_python_and_machine_code_agree(n):
 
 
 def walk(tree: Bvh8, lower, upper):
-    """Check a tree's structure; the number of its levels and the sizes of its leaves."""
+    """Check a tree's structure; how high a ray's stack gets at most, and the sizes of its leaves."""
     nodes, codes = tree.nodes, tree.nodes.view(np.int32)[:, CHILDREN : CHILDREN + 8]
-    seen, sizes, levels = [], [], 0
-    todo = [(0, 1, np.arange(0))]
+    seen, sizes, height = [], [], 0
+    todo = [(0, 0)]
     visited = set()
     while todo:
-        node, level, _ = todo.pop()
+        node, below = todo.pop()
         assert node not in visited
         visited.add(node)
-        levels = max(levels, level)
+        height = max(height, below + 8)
         for k in range(8):
             code = int(codes[node, k])
             low, high = nodes[node, k:48:16].astype(float), nodes[node, 8 + k : 48 : 16].astype(float)
@@ -274,7 +279,7 @@ def walk(tree: Bvh8, lower, upper):
                 assert (high == -np.inf).all()
                 continue
             if code < LEAF:
-                todo.append((code, level + 1, None))
+                todo.append((code, below + np.count_nonzero(codes[node]) - 1))
                 inner = codes[code] != 0
                 below_low, below_high = nodes[code, :48].reshape(3, 2, 8)[:, :, inner].transpose(1, 0, 2)
                 assert (below_low.min(axis=1) == low).all()
@@ -291,7 +296,7 @@ def walk(tree: Bvh8, lower, upper):
     assert sorted(np.concatenate([*seen, np.arange(0)])) == list(range(len(lower)))
     assert visited == set(range(len(nodes)))
     assert nodes.ctypes.data % 64 == 0
-    return levels, sizes
+    return height, sizes
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 4, 5, 9, 64, 65, 1000])
@@ -326,9 +331,91 @@ def nested_by_doubling(n):
 @pytest.mark.parametrize("boxes", [exponential, concentric, nested_by_doubling, lambda n: (np.ones((n, 3)),) * 2])
 def test_degenerate_boxes_make_bounded_trees(boxes, n):
     lower, upper = boxes(n)
-    levels, _ = walk(build(lower, upper, 1), lower, upper)
-    assert levels <= MAX_LEVELS
-    assert 7 * MAX_LEVELS + 1 <= STACK_WORDS
+    height, _ = walk(build(lower, upper, 1), lower, upper)
+    assert height <= STACK_WORDS
+
+
+def test_a_tree_that_is_too_deep_is_built_anew(monkeypatch):
+    """Boxes of which each split cuts off few make a deep tree; halving makes one that is as flat as can be."""
+    lower, upper = nested_by_doubling(60)
+    monkeypatch.setattr(binned_sah, "runnable", lambda function, n: function)
+    deep, _ = walk(build(lower, upper, 1), lower, upper)
+    monkeypatch.setattr(collapsing, "STACK_WORDS", deep - 1)
+    flat, _ = walk(build(lower, upper, 1), lower, upper)
+    assert flat < deep
+    assert 7 * 25 + 8 <= STACK_WORDS  # 2^26 items, halved again and again: at most 26 levels
+
+
+def least_cost(ranges, r, places):
+    """C(r, i) of Ylitie, Karras and Laine (2017), straight from its definition."""
+    area = half_area(F32x8(ranges[r, :4].view(np.float32)))
+    lower = int(ranges[r, HALVES])
+    if lower == 0:
+        return area
+    if places == 1:
+        return area + min(least_cost(ranges, lower, k) + least_cost(ranges, lower + 1, 8 - k) for k in range(1, 8))
+    shared = [least_cost(ranges, lower, k) + least_cost(ranges, lower + 1, places - k) for k in range(1, places)]
+    return min(*shared, least_cost(ranges, r, places - 1))
+
+
+def test_nodes_of_eight_cost_the_least():
+    """The surfaces of all nodes and leaves add up to the least sum that any choice of nodes has."""
+    rng = np.random.default_rng(12)
+    for n in (9, 14, 23):
+        boxes = aligned((n, 8), np.float32)
+        corner = rng.uniform(-1, 0.6, (n, 3))
+        boxes[:, :3], boxes[:, 4:7] = corner, -corner - rng.uniform(0, 0.4, (n, 3))
+        order, ranges = np.arange(n, dtype=np.int32), aligned((2 * n, 8), np.int64)
+        used = divide(Table(boxes), Table(order), n, 1, 48, Table(ranges))
+        plans, nodes = aligned((used, 8), np.int64), aligned((used, 64), np.float32)
+        plan_ranges(Table(ranges), used, Table(plans))
+        filled = collapse(Table(ranges), Table(plans), 1, Table(nodes))
+        total = half_area(F32x8(ranges[0, :4].view(np.float32)))
+        for node in nodes[:filled]:
+            low, high = node[:48].reshape(3, 2, 8).astype(float).transpose(1, 2, 0)
+            e = (high - low)[node.view(np.int32)[CHILDREN : CHILDREN + 8] > 0]
+            total += (e[:, 0] * e[:, 1] + e[:, 1] * e[:, 2] + e[:, 2] * e[:, 0]).sum()
+        np.testing.assert_allclose(total, least_cost(ranges, 0, 1), rtol=1e-6)
+        assert ranges[0, COUNT] == n
+
+
+def test_any_hit_rays_visit_first_what_stops_most_for_its_cost():
+    """Lanes ascend by probability over cost, recomputed here from the triangles themselves."""
+    rng = np.random.default_rng(13)
+    vertices = rng.uniform(-1, 1, (900, 3)) * rng.uniform(0.02, 1.0, (900, 1))
+    faces = rng.integers(0, 900, (700, 3)).astype(np.int32)
+    mesh = build_mesh(vertices, faces)
+    nodes, codes = mesh.tree.nodes.astype(float), mesh.tree.nodes.view(np.int32)[:, CHILDREN : CHILDREN + 8]
+    corner = (vertices[faces] - mesh.tree.center) * mesh.tree.scale
+    areas = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+
+    def worth(node):
+        """Probability that a node stops a ray that meets it, and what that costs."""
+        low, high = nodes[node, :48].reshape(3, 2, 8).transpose(1, 2, 0)
+        there = codes[node] > 0
+        assert (np.diff(there.astype(int)) >= 0).all()  # empty lanes first
+        e = np.where(there[:, None], high - low, 0)
+        h = e[:, 0] * e[:, 1] + e[:, 1] * e[:, 2] + e[:, 2] * e[:, 0]
+        whole = high[there].max(axis=0) - low[there].min(axis=0)
+        q = np.minimum(h / (whole[0] * whole[1] + whole[1] * whole[2] + whole[2] * whole[0]), 1)
+        p, cost = np.zeros(8), np.ones(8)
+        for lane in np.flatnonzero(there):
+            code = int(codes[node, lane])
+            if code < LEAF:
+                p[lane], cost[lane] = worth(code)
+            else:
+                numbers = mesh.numbers[code - LEAF]
+                p[lane] = min(areas[numbers[numbers >= 0]].sum() / h[lane], 1)
+        assert (np.diff((p / cost)[there]) >= -1e-5).all()
+        left = np.concatenate([[1], np.cumprod(1 - (q * p)[::-1])])
+        return 1 - left[-1], 1 + (left[:-1] * (q * cost)[::-1]).sum()
+
+    worth(0)
+    again = [mesh.tree.nodes.copy() for _ in range(2)]
+    for nodes_again, run in zip(again, (order_children, native(order_children)), strict=True):
+        nodes_again[:, :56] = nodes_again.reshape(-1, 8, 8)[:, :7, ::-1].reshape(-1, 56)
+        run(Table(nodes_again), len(nodes), Table(mesh.blocks), 48, Table(aligned((len(nodes), 2), np.float64)))
+    np.testing.assert_array_equal(*(a.view(np.int32) for a in again))
 
 
 def test_coincident_triangles_are_found():
@@ -341,16 +428,18 @@ def test_coincident_triangles_are_found():
 
 def test_builder_in_python_and_machine_code_agree():
     results = []
-    for run in (build_nodes, native(build_nodes)):
+    for compiled in (lambda function: function, native):
         boxes = aligned((50, 8), np.float32)
         corner = np.random.default_rng(10).uniform(-1, 0.9, (50, 3))
         boxes[:, :3], boxes[:, 4:7] = corner, -corner - 0.1
-        order, nodes = np.arange(50, dtype=np.int32), aligned((64, 64), np.float32)
-        used = run(Table(boxes), Table(order), 50, 4, Table(nodes))
-        results.append((used, order, nodes))
-    assert results[0][0] == results[1][0]
-    np.testing.assert_array_equal(results[0][1], results[1][1])
-    np.testing.assert_array_equal(results[0][2].view(np.int32), results[1][2].view(np.int32))
+        order, ranges = np.arange(50, dtype=np.int32), aligned((100, 8), np.int64)
+        used = compiled(divide)(Table(boxes), Table(order), 50, 4, 48, Table(ranges))
+        plans, nodes = aligned((used, 8), np.int64), aligned((64, 64), np.float32)
+        compiled(plan_ranges)(Table(ranges), used, Table(plans))
+        filled = compiled(collapse)(Table(ranges), Table(plans), 4, Table(nodes))
+        results.append((np.array([used, filled]), order, ranges, plans, nodes.view(np.int32)))
+    for slow, fast in zip(*results, strict=True):
+        np.testing.assert_array_equal(slow, fast)
 
 
 def test_unbounded_boxes_are_refused():

@@ -1,4 +1,4 @@
-"""The engine: the same picture for any threads, any structure, any language it runs in; stopping; adaptive passes."""
+"""The engine: the same picture for any threads, any tiles, any structure, any language it runs in; progress; bad options."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from sightray.engine.pixels import render_tile
 from sightray.engine.run import run
 from sightray.film.film import Film
 from sightray.filters.table import filter_table
-from sightray.mathlib.table import NULL, Space
+from sightray.mathlib.table import Space, Table
+from sightray.registry import members
 from sightray.scene.compile import compile_scene
 from sightray.scenes import build
 
@@ -28,18 +29,21 @@ def small(name="whitted", width=48, height=36):
     return scene.replace(camera=scene.camera.resized(width, height))
 
 
-def test_threads_do_not_change_the_picture():
+@pytest.mark.parametrize("sampler", [cls() for cls in members("samplers").values()], ids=repr)
+def test_threads_and_tiles_do_not_change_the_picture(sampler, monkeypatch):
+    scene = small(width=100, height=70)
+    options = {"samples": 6, "seed": 5, "sampler": sampler, "adaptive": "error"}
+    one, three = (np.asarray(sr.render(scene, threads=n, **options)) for n in (1, 3))
+    assert (one == three).all()
+    monkeypatch.setattr("sightray.engine.run.TILE", 7)
+    assert (np.asarray(sr.render(scene, **options)) == one).all()
+
+
+def test_seeds_change_the_picture_and_threads_do_not():
     scene = small(width=100, height=70)
     one, three = (np.asarray(sr.render(scene, samples=3, seed=5, threads=n)) for n in (1, 3))
     assert (one == three).all()
     assert (one != np.asarray(sr.render(scene, samples=3, seed=6))).any()
-
-
-def test_tiles_do_not_change_the_picture(monkeypatch):
-    scene = small(width=100, height=70)
-    large = np.asarray(sr.render(scene, samples=2))
-    monkeypatch.setattr("sightray.engine.run.TILE", 7)
-    assert (np.asarray(sr.render(scene, samples=2)) == large).all()
 
 
 def test_machine_code_and_python_see_the_same():
@@ -52,8 +56,8 @@ def test_machine_code_and_python_see_the_same():
     space = Space()
     render_tile(
         compiled.world, compiled.tables.row_of(integrator), compiled.tables.row_of(SAMPLER), slow.table,
-        filter_table(sr.GaussianFilter(), space), NULL,
-        space.row(8), 0, 0, 12, 9, 12, 0, 4, 3,
+        filter_table(sr.GaussianFilter(), space), Table(np.full((9, 12), 4, np.int32)),
+        space.row(8), 0, 0, 12, 9, 12, 4, 0, 3,
     )  # fmt: skip
     np.testing.assert_allclose(fast.pixels, slow.pixels, rtol=1e-6, atol=1e-9)
 
@@ -74,34 +78,6 @@ def test_one_sample_goes_through_the_centre():
     assert (np.asarray(sr.render(sr.Scene(*marks, camera=camera))) == 1).all()
 
 
-def test_adaptive_samples_go_where_neighbours_differ():
-    camera = sr.OrthographicCamera(eye=(0, 0, 5), target=(0, 0, 0), view_height=4, width=64, height=64)
-    edge = sr.Rectangle(corner=(-9, -9, 0), edge_u=(9.01, 3, 0), edge_v=(0, 18, 0),
-                        material=sr.Lambert(albedo=0, emission=1))  # fmt: skip
-    scene = sr.Scene(edge, camera=camera)
-    image = sr.render(scene, samples=4, adaptive=0.1, max_samples=64)
-    counts = image.info["sample_count"]
-    assert set(np.unique(counts)) == {4, 64}
-    assert (counts == 64).mean() < 0.1
-    exact = np.asarray(sr.render(scene, samples=1024))
-    plain = np.asarray(sr.render(scene, samples=4))
-    assert np.abs(np.asarray(image) - exact).max() < 0.25
-    assert np.abs(np.asarray(image) - exact).sum() < 0.4 * np.abs(plain - exact).sum()
-
-
-def test_film_statistics_are_the_sample_statistics():
-    scene = small("stage2-local-illumination", 16, 12)
-    film = run(compile_scene(scene), scene.integrator, SAMPLER, sr.BoxFilter(), samples=64, seed=1).film
-    means = [film.pixels[..., :3] / film.pixels[..., 4:5]]
-    for seed in range(2, 12):
-        again = run(compile_scene(scene), scene.integrator, SAMPLER, sr.BoxFilter(), samples=64, seed=seed).film
-        means.append(again.pixels[..., :3] / again.pixels[..., 4:5])
-    spread = (np.array(means) @ [0.2126, 0.7152, 0.0722]).std(axis=0, ddof=1)
-    ratio = np.sqrt((spread**2).mean() / (film.standard_error() ** 2).mean())
-    assert 0.1 < ratio < 1.05  # stratified samples vary less than independent ones
-    assert (film.counts() == 64).all()
-
-
 def test_progress_is_told_in_order():
     told = []
     sr.render(small(), samples=4, progress=told.append)
@@ -110,6 +86,11 @@ def test_progress_is_told_in_order():
     assert [p.done for p in renders] == sorted(p.done for p in renders)
     assert renders[-1].fraction == 1
     assert renders[-1].rays > 48 * 36 * 4
+    assert [p.image() for p in told if p.stage == "compile"] == [None] * (len(told) - len(renders))
+    shown = renders[-1].image()
+    assert (np.asarray(shown) == np.asarray(sr.render(small(), samples=4))).all()
+    first = next(p for p in renders if p.done >= 48 * 36).image()
+    assert (np.asarray(first) > 0).any(axis=-1).mean() > 0.95  # a whole picture after one sample
 
 
 def test_an_exception_in_the_callback_stops_the_render():
@@ -150,6 +131,15 @@ def test_ctrl_c_saves_what_there_is(tmp_path):
         ({"samples": 0}, "samples: got 0; allowed: a whole number from 1"),
         ({"samples": 2.5}, "samples: got 2.5"),
         ({"adaptive": 2}, "adaptive: got 2"),
+        ({"adaptive": "eror"}, "adaptive: got 'eror'; did you mean 'error'"),
+        ({"adaptive": 0.1, "target_error": 0.1}, "adaptive: a contrast does not go together with target_error"),
+        ({"time": 0}, r"time: got 0; allowed: a number > 0 \(seconds\)"),
+        ({"time": float("nan")}, "time: got nan"),
+        ({"target_error": -1}, "target_error: got -1"),
+        ({"resume": True}, "checkpoint: missing"),
+        ({"checkpoint": "nowhere/at/all"}, "the folder 'nowhere/at' does not exist"),
+        ({"checkpoint": "x", "checkpoint_every": 0}, "checkpoint_every: got 0"),
+        ({"sampler": sr.BoxFilter()}, "sampler: got BoxFilter"),
         ({"threads": 0}, "threads: got 0"),
         ({"filter": sr.Sphere()}, "filter: got Sphere"),
         ({"integrator": "whitted"}, "integrator: got 'whitted'"),

@@ -10,10 +10,11 @@ import trimesh
 
 from sightray._jit import kernel, native
 from sightray.bvh.casting import END, PACKET_WORDS, PRIM, cast_packet, share
-from sightray.bvh.packets import any_rays, closest_rays, extremes
+from sightray.bvh.hulls import are_close, extremes
+from sightray.bvh.packets import ROOM_WORDS, SPREAD, any_rays, closest_rays
 from sightray.bvh.triangles import MESH_WORDS, any_triangle, build_mesh, closest_triangle, pack_mesh
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, scratch
+from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, i64_at, scratch
 from sightray.mathlib.vec import Vec3
 
 LANES = np.arange(16)
@@ -21,22 +22,22 @@ LANES = np.arange(16)
 
 @kernel
 def coherent(mesh: Table, packet: Table, t_min: f64) -> bool:
-    work = scratch(272)
-    alive = cast_packet(mesh, packet, t_min, work)
-    return alive == 0 or extremes(work, share(packet, work, alive)).close
+    work, lanes = scratch(192), scratch(168)
+    alive = cast_packet(mesh, packet, t_min, work, lanes)
+    return alive == 0 or (share(packet, lanes, alive).same and are_close(extremes(lanes), SPREAD))
 
 
 @kernel
-def trace_both(mesh: Table, packets: Table, n: i64, t_min: f64, single: Table, packet: Table) -> i64:
+def trace_both(mesh: Table, packets: Table, n: i64, together: i64, t_min: f64, single: Table, packet: Table) -> i64:
     """For each ray of n packets: t, triangle, whether anything is met, in two ways; how many are coherent."""
-    copy = scratch(512)
+    copy, blocked, found, room = scratch(2048), scratch(16), scratch(16), scratch(ROOM_WORDS)
     side_by_side = 0
-    for first in range(0, n, 4):
-        rays, count = advance(packets, first * 128), min(4, n - first)
+    for first in range(0, n, together):
+        rays, count = advance(packets, first * 128), min(together, n - first)
         for word in range(128 * count):
             f64_put(copy, word, f64_at(rays, word))
-        blocked = any_rays(mesh, copy, count, t_min)
-        found = closest_rays(mesh, copy, count, t_min)
+        any_rays(mesh, copy, count, t_min, blocked, room)
+        closest_rays(mesh, copy, count, t_min, found, room)
         for p in range(count):
             side_by_side += 1 if coherent(mesh, advance(rays, 128 * p), t_min) else 0
         for k in range(16 * count):
@@ -48,10 +49,10 @@ def trace_both(mesh: Table, packets: Table, n: i64, t_min: f64, single: Table, p
             f64_put(single, at, hit.t)
             f64_put(single, at + 1, float(hit.prim))
             f64_put(single, at + 2, 1.0 if any_triangle(mesh, o, d, t_min, end) else 0.0)
-            met = (found >> k) & 1 != 0
+            met = i64_at(found, k // 16) >> (k % 16) & 1 != 0
             f64_put(packet, at, f64_at(copy, 96 + i) if met else math.inf)
             f64_put(packet, at + 1, f64_at(copy, 112 + i) if met else -1.0)
-            f64_put(packet, at + 2, 1.0 if (blocked >> k) & 1 != 0 else 0.0)
+            f64_put(packet, at + 2, 1.0 if i64_at(blocked, k // 16) >> (k % 16) & 1 != 0 else 0.0)
     return side_by_side
 
 
@@ -62,7 +63,7 @@ def packed(vertices, faces):
     return space, row
 
 
-def compare(row, o, d, end=math.inf, t_min=0.0, run=None):
+def compare(row, o, d, end=math.inf, t_min=0.0, run=None, together=16):
     """Assert that packets and single rays agree; what they find, and the share of coherent packets. o, d: (n, 16, 3)."""
     assert (END, PRIM, PACKET_WORDS) == (96, 112, 128)
     o, d = np.broadcast_arrays(o, d)
@@ -71,7 +72,7 @@ def compare(row, o, d, end=math.inf, t_min=0.0, run=None):
     packets[:, 96:112] = end
     single, packet = np.empty((len(o), 16, 3)), np.empty((len(o), 16, 3))
     run = run or native(trace_both)
-    coherent = run(row, Table(packets), len(o), t_min, Table(single), Table(packet))
+    coherent = run(row, Table(packets), len(o), together, t_min, Table(single), Table(packet))
     np.testing.assert_array_equal(packet, single)
     np.testing.assert_array_equal(single[..., 2], np.isfinite(single[..., 0]))
     return single, coherent / len(o)
@@ -104,6 +105,25 @@ def test_packets_find_what_single_rays_find(width, scale, offset):
     assert coherent > 0.5 if width <= 1e-3 else coherent < 0.9
     ends = np.random.default_rng(2).uniform(0.0, 1.5, (1500, 16))
     compare(row, o * scale + offset, d * scale, ends, t_min=0.2)
+
+
+@pytest.mark.parametrize("together", [1, 3, 4, 7, 16])
+@pytest.mark.parametrize("width", [1e-3, 4e-3, 0.02])
+def test_packets_that_form_groups(width, together):
+    """Four packets next to each other, of which one may go another way, or be without rays."""
+    rng = np.random.default_rng(6)
+    _space, row = packed(*ball())
+    o, d = bundles(rng, 400, 0.0)
+    o, d = (np.repeat(a, 4, axis=0) for a in (o, d))
+    size = np.linalg.norm(d, axis=2, keepdims=True)
+    d = d + width * size * (rng.normal(size=d.shape) * 0.3 + rng.normal(size=(len(d), 1, 3)))
+    astray = rng.random(len(d)) < 0.2
+    d[astray] = rng.normal(size=(astray.sum(), 16, 3))
+    ends = np.where(rng.random((len(d), 1)) < 0.1, math.nan, rng.uniform(0.5, 4.0, (len(d), 16)))
+    for end in (math.inf, ends):
+        found, coherent = compare(row, o, d, end, together=together)
+        assert 0.05 < coherent < 0.95
+        assert 0.1 < np.isfinite(found[..., 0]).mean() < 1.0
 
 
 def test_bundles_from_one_eye_through_edges_and_vertices():

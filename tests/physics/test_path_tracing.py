@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 
 import sightray as sr
-from sightray._jit import kernel, native
+from sightray._jit import kernel
 from sightray.integrators.shading import frame_about, into, out_of
-from sightray.materials.base import bsdf, sample_bsdf
-from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, f64_at, f64_put, vec3_at, vec3_put
-from sightray.mathlib.vec import Vec3
-from sightray.registry import members
-from sightray.scene.compile import Tables
-from sightray.textures.base import anywhere
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table, vec3_at, vec3_put
 
 TINY = {"width": 8, "height": 8}
 TRACERS = [sr.SimplePathTracer, sr.PathTracer]
@@ -110,131 +105,6 @@ def test_roulette_and_clamp():
     assert abs(plain[0] - early[0]) < 4 * math.hypot(plain[1], early[1])
     clamped = np.asarray(sr.render(scene, sr.PathTracer(clamp=0.01, max_depth=100), samples=16))
     assert clamped.mean() < plain[0] * 0.9
-
-
-MATERIALS = {
-    "Lambert": [sr.Lambert(albedo=(0.9, 0.4, 0.1))],
-    "Phong": [sr.Phong(diffuse=0.5, specular=0.3, shininess=20), sr.Phong(diffuse=0, specular=1, shininess=3),
-              sr.Phong(diffuse=0.2, specular=0.2, shininess=8, mirror=0.6)],
-    "Mirror": [sr.Mirror(reflectance=0.8)],
-    "Glass": [sr.Glass(ior=1.5), sr.Glass(ior=0.7)],
-    "Emitter": [sr.Emitter()],
-}  # fmt: skip
-
-
-def test_every_material_has_an_example():
-    own = {name for name, cls in members("materials").items() if cls.__module__.startswith("sightray.")}
-    assert set(MATERIALS) == own
-
-
-@kernel
-def ask_bsdf(material: Table, numbers: Table, count: i64, out: Table) -> None:
-    where = anywhere(0.3, 0.4, Vec3(0.0, 0.0, 0.0))
-    for k in range(count):
-        wo = vec3_at(numbers, 8 * k)
-        chosen = sample_bsdf(
-            material, where, wo, f64_at(numbers, 8 * k + 4), f64_at(numbers, 8 * k + 5), f64_at(numbers, 8 * k + 6)
-        )
-        back, forth = bsdf(material, where, wo, chosen.wi), bsdf(material, where, chosen.wi, wo)
-        vec3_put(out, 16 * k, chosen.wi)
-        vec3_put(out, 16 * k + 4, chosen.weight)
-        vec3_put(out, 16 * k + 8, back.value)
-        f64_put(out, 16 * k + 12, chosen.density)
-        f64_put(out, 16 * k + 13, back.density)
-        f64_put(out, 16 * k + 14, forth.value.x)
-
-
-def asked(material, wo, count, compiled=True, seed=1):
-    rng = np.random.default_rng(seed)
-    tables = Tables()
-    row = tables.row_of(material)
-    tables.prepare(ask_bsdf, compiled=compiled)
-    numbers = np.zeros((count, 8))
-    numbers[:, :3], numbers[:, 4:7] = wo, rng.random((count, 3))
-    out = np.zeros((count, 16))
-    (native(ask_bsdf) if compiled else ask_bsdf)(row, tables.space.array(numbers), count, tables.space.array(out))
-    return out
-
-
-EXAMPLES = [pytest.param(m, id=f"{name}{k}") for name, some in MATERIALS.items() for k, m in enumerate(some)]
-VIEWERS = [
-    np.array([0.0, 0, 1]),
-    np.array([0.6, 0.0, 0.8]),
-    np.array([0.3, -0.9, 0.3]) / math.sqrt(0.99),
-    np.array([0.6, 0, -0.8]),
-]
-
-
-@pytest.mark.parametrize("material", EXAMPLES)
-@pytest.mark.parametrize("wo", VIEWERS, ids=["top", "side", "grazing", "inside"])
-def test_samples_agree_with_values(material, wo):
-    """weight * density = value; the density is the one that `bsdf` states; both orders of directions agree."""
-    out = asked(material, wo, 2000)
-    wi, weight, value = out[:, :3], out[:, 4:7], out[:, 8:11]
-    rough = (out[:, 12] > 0) & (weight.max(1) > 0)
-    np.testing.assert_allclose(np.linalg.norm(wi, axis=1), 1, rtol=1e-9)
-    np.testing.assert_allclose(weight[rough] * out[rough, 12:13], value[rough], rtol=1e-9, atol=1e-14)
-    np.testing.assert_allclose(out[rough, 12], out[rough, 13], rtol=1e-9)
-    # Helmholtz: f is symmetric, so values over their cosines are.
-    np.testing.assert_allclose(
-        value[rough, 0] / np.abs(wi[rough, 2]), out[rough, 14] / abs(wo[2]), rtol=1e-7, atol=1e-12
-    )
-    # No material sends back more than arrives: the mean weight is the albedo.
-    assert (weight.mean(0) < 1 + 4 * weight.std(0) / math.sqrt(len(weight)) + 1e-9).all()
-
-
-@pytest.mark.parametrize("material", [m for m in EXAMPLES if m.id in ("Lambert0", "Phong0", "Phong1")])
-@pytest.mark.parametrize("wo", VIEWERS, ids=["top", "side", "grazing", "inside"])
-def test_sampling_matches_its_density(material, wo):
-    """Pearson's chi-square of sampled directions against the density that `bsdf` states, on a grid over the sphere."""
-    count, rows, columns = 40_000, 10, 12
-    out = asked(material, wo, count)
-    wi = out[:, :3]
-    inside = out[:, 13] > 0
-    cell = np.clip(((wi[:, 2] + 1) / 2 * rows).astype(int), 0, rows - 1) * columns
-    cell += np.clip(((np.arctan2(wi[:, 1], wi[:, 0]) / math.pi + 1) / 2 * columns).astype(int), 0, columns - 1)
-    seen = np.bincount(cell[inside], minlength=rows * columns)
-    # Integrate the density over each cell by importance: uniform directions, weighed.
-    fine = 48
-    z = (np.arange(rows * fine) + 0.5) / (rows * fine) * 2 - 1
-    phi = ((np.arange(columns * fine) + 0.5) / (columns * fine) * 2 - 1) * math.pi
-    z, phi = np.meshgrid(z, phi, indexing="ij")
-    r = np.sqrt(1 - z * z)
-    grid = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1).reshape(-1, 3)
-    density = densities(material, wo, grid).reshape(rows, fine, columns, fine).mean((1, 3)).ravel()
-    density *= 4 * math.pi / (rows * columns)
-    expected = density * count
-    big = expected > 10
-    statistic = ((seen[big] - expected[big]) ** 2 / expected[big]).sum()
-    freedom = big.sum() - 1
-    assert statistic < freedom + 4 * math.sqrt(2 * freedom) + 8
-    assert seen[~big].sum() < expected[~big].sum() + 6 * math.sqrt(expected[~big].sum() + 1)
-
-
-@kernel
-def ask_density(material: Table, wo: Table, directions: Table, count: i64, out: Table) -> None:
-    where = anywhere(0.3, 0.4, Vec3(0.0, 0.0, 0.0))
-    for k in range(count):
-        f64_put(out, k, bsdf(material, where, vec3_at(wo, 0), vec3_at(directions, 4 * k)).density)
-
-
-def densities(material, wo, directions):
-    tables = Tables()
-    row = tables.row_of(material)
-    tables.prepare(ask_density)
-    packed = np.zeros((len(directions), 4))
-    packed[:, :3] = directions
-    out, viewer = np.zeros(len(directions)), np.append(wo, 0.0)
-    array = tables.space.array
-    native(ask_density)(row, array(viewer), array(packed), len(directions), array(out))
-    return out
-
-
-@pytest.mark.parametrize("material", EXAMPLES)
-def test_machine_code_and_python_choose_the_same(material):
-    np.testing.assert_allclose(
-        asked(material, VIEWERS[1], 40), asked(material, VIEWERS[1], 40, compiled=False), rtol=1e-9, atol=1e-12
-    )
 
 
 @kernel

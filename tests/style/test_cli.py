@@ -81,6 +81,40 @@ def test_integrators_have_short_names(tmp_path):
     assert result.returncode == 0, result.stderr
 
 
+@pytest.mark.parametrize("name", ["sobol", "halton", "stratified", "blue-noise", "Blue_Noise", "independentsampler"])
+def test_samplers_have_short_names(name):
+    from sightray.cli.common import named_sampler
+
+    assert type(named_sampler(name)).__name__.lower().startswith(name.lower()[:4])
+
+
+def test_limits_end_a_render_and_are_told(tmp_path):
+    options = ["--integrator", "path", "--width", 32, "--sampler", "blue-noise", "-q"]
+    timed = sightray("render", "cornell", *options, "--time", 0.3, cwd=tmp_path)
+    assert "samples per pixel, relative error" in timed.stdout
+    exact = sightray("render", "cornell", *options, "--target-error", 0.5, "--samples", 100000, cwd=tmp_path)
+    assert float(exact.stdout.rsplit(maxsplit=1)[1]) <= 0.5
+
+
+def test_samples_that_are_no_numbers_are_told(tmp_path):
+    """A light too bright for numbers: its square overflows."""
+    (tmp_path / "a.yaml").write_text(
+        "camera: {type: PerspectiveCamera, width: 8, height: 8}\nobjects:\n"
+        "  - {type: Sphere}\n  - {type: PointLight, position: [0, 0, 9], intensity: 1.0e+200}\n"
+    )
+    result = sightray("render", "a.yaml", "-q", cwd=tmp_path)
+    assert result.returncode == 0
+    assert "samples were no finite numbers" in result.stderr
+
+
+def test_a_checkpoint_is_resumed_or_refused(tmp_path):
+    options = ["cornell", "--width", 16, "--samples", 3, "-q", "--checkpoint", "state"]
+    assert sightray("render", *options, cwd=tmp_path).returncode == 0
+    assert "the file exists" in refused("render", *options, cwd=tmp_path)
+    assert sightray("render", *options, "--resume", cwd=tmp_path).returncode == 0
+    assert "different seed: it has 0, this has 1" in refused("render", *options, "--resume", "--seed", 1, cwd=tmp_path)
+
+
 def test_explain(tmp_path):
     result = sightray("explain", "whitted", "--pixel", "20,30", "--width", 64)
     assert result.returncode == 0, result.stderr
@@ -113,6 +147,11 @@ def test_version():
         (["render", "whitted", "--samples", "0"], ["samples", "got 0"]),
         (["render", "whitted", "--integrator", "whited"], ["whited", "did you mean 'Whitted'"]),
         (["render", "whitted", "--adaptive", "7"], ["adaptive", "got 7"]),
+        (["render", "whitted", "--adaptive", "eror"], ["adaptive", "did you mean 'error'"]),
+        (["render", "whitted", "--sampler", "SobolSamplr"], ["SobolSamplr", "did you mean 'SobolSampler'"]),
+        (["render", "whitted", "--time", "0"], ["time", "got 0"]),
+        (["render", "whitted", "--resume"], ["checkpoint: missing"]),
+        (["render", "whitted", "--checkpoint", "no/state"], ["no/state", "does not exist"]),
         (["render", "a.obj", "--limit", "max_triangles"], ["--limit", "max_triangles"]),
         (["render", "a.obj", "--limit", "max_traingles=5"], ["max_traingles", "max_triangles"]),
         (["explain", "whitted", "--pixel", "1000,1000"], ["pixel", "(1000, 1000)"]),

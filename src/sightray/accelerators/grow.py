@@ -25,6 +25,7 @@ class Level(NamedTuple):
     upper: np.ndarray
     box_lower: np.ndarray  # (k, 3) boxes of the nodes
     box_upper: np.ndarray
+    which: np.ndarray  # (m,) numbers of the primitives
 
     def centers(self) -> np.ndarray:
         """Twice the centres of the primitives."""
@@ -64,7 +65,8 @@ def grow_tree(lower: np.ndarray, upper: np.ndarray, divide: Divide) -> Tree:
         node = np.repeat(np.arange(len(first)), count)
         where = np.arange(count.sum()) - start[node] + first[node]
         low, high = lower[order[where]], upper[order[where]]
-        level = Level(node, start, count, low, high, np.minimum.reduceat(low, start), np.maximum.reduceat(high, start))
+        boxes = np.minimum.reduceat(low, start), np.maximum.reduceat(high, start)
+        level = Level(node, start, count, low, high, *boxes, order[where])
 
         # Divide them: the range of a node is sorted, and cut in two.
         key, left = divide(level, len(levels))

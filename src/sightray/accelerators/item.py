@@ -2,7 +2,8 @@
 
 An item row is `ITEM_WORDS` words: where its shape and material stand, the number of the scene's object that it belongs
 to, the number of the light that it is the shape of (or -1), what its material is beside a plain surface, and the two
-matrices between world and object.
+matrices between world and object. What moves has them for time 0; rays meet its `shapes.moving` wrapper, to which the
+4th lane of their origin, the time in seconds, says where it is. Points on rays and in object space carry that on.
 Instances share the shape's row, and so its triangles and its tree.
 """
 
@@ -17,9 +18,14 @@ from sightray.mathlib.table import Table, advance, i64_at, table_at
 from sightray.mathlib.transform import transform_normal, transform_point, transform_vector
 from sightray.mathlib.vec import Vec3, normalize
 from sightray.shapes.base import Surface, intersect, occluded, surface
+from sightray.shapes.moving import normal_in_moving, point_in_moving
 
-SHAPE, MATERIAL, MOVED, OBJECT, LIGHT, FLAGS = 0, 1, 2, 3, 4, 5  # MOVED: 0 where object space is world space
-CUTOUT, BUMPY, ORIENTED, CLEAR, THIN, TRANSLUCENT = 1, 2, 4, 8, 16, 32  # bits of FLAGS: what the material is, see materials/base.py
+SHAPE, MATERIAL, MOVED, OBJECT, LIGHT, FLAGS = 0, 1, 2, 3, 4, 5
+MET = 7  # what rays meet: the shape, or the wrapper of what moves
+UNMOVED, PLACED, MOVING = 0, 1, 2  # MOVED: object space is world space; is not; and changes with time
+LIGHT_STEP = 6  # from the light that a primitive is to that of the next: 1 where each triangle is one, else 0
+# Bits of FLAGS: what the material is, see materials/base.py.
+CUTOUT, BUMPY, ORIENTED, CLEAR, THIN, TRANSLUCENT = 1, 2, 4, 8, 16, 32
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
 ITEM_WORDS = 40
 
@@ -57,8 +63,8 @@ def item_at(items: Table, index: i64) -> Table:
 @kernel
 def intersect_item(item: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Hit:
     """Send the inverse-transformed ray to the item's shape; t means the same in both spaces."""
-    shape = table_at(item, SHAPE)
-    if i64_at(item, MOVED) == 0:
+    shape = table_at(item, MET)
+    if i64_at(item, MOVED) != PLACED:
         return intersect(shape, o, d, t_min, t_max)
     o_object = transform_point(item, OBJECT_FROM_WORLD, o)
     d_object = transform_vector(item, OBJECT_FROM_WORLD, d)
@@ -68,8 +74,8 @@ def intersect_item(item: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> Hit
 @kernel
 def occluded_item(item: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
     """Whether the item stands in the way."""
-    shape = table_at(item, SHAPE)
-    if i64_at(item, MOVED) == 0:
+    shape = table_at(item, MET)
+    if i64_at(item, MOVED) != PLACED:
         return occluded(shape, o, d, t_min, t_max)
     o_object = transform_point(item, OBJECT_FROM_WORLD, o)
     d_object = transform_vector(item, OBJECT_FROM_WORLD, d)
@@ -79,8 +85,11 @@ def occluded_item(item: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool
 @kernel
 def item_surface(item: Table, hit: ItemHit, p_object: Vec3) -> Surface:
     """The surface at a hit in world space: normals by the inverse transpose, tangents by the matrix."""
-    s = surface(table_at(item, SHAPE), Hit(hit.t, hit.prim, hit.u, hit.v), p_object)
-    if i64_at(item, MOVED) == 0:
+    moved = i64_at(item, MOVED)
+    # Only what moves is told the time: normals and tangents have none.
+    p = Vec3(p_object.x, p_object.y, p_object.z, p_object.w if moved == MOVING else 0.0)
+    s = surface(table_at(item, MET), Hit(hit.t, hit.prim, hit.u, hit.v), p)
+    if moved != PLACED:
         return s
     return Surface(
         transform_normal(item, OBJECT_FROM_WORLD, s.normal),
@@ -91,15 +100,26 @@ def item_surface(item: Table, hit: ItemHit, p_object: Vec3) -> Surface:
 
 @kernel
 def normal_in_object(item: Table, n: Vec3) -> Vec3:
-    """A world normal as a unit vector of the item's object space."""
-    if i64_at(item, MOVED) == 0:
+    """A world normal as a unit vector of the item's object space, at time 0."""
+    return normal_in_object_at(item, n, 0.0)
+
+
+@kernel
+def normal_in_object_at(item: Table, n: Vec3, time: f64) -> Vec3:
+    """A world normal as a unit vector of the item's object space at a time, seconds."""
+    moved = i64_at(item, MOVED)
+    if moved == UNMOVED:
         return normalize(n)
+    if moved == MOVING:
+        return normalize(normal_in_moving(table_at(item, MET), n, time))
     return normalize(transform_normal(item, WORLD_FROM_OBJECT, n))
 
 
 @kernel
 def to_object(item: Table, p: Vec3) -> Vec3:
-    """A world point in the item's object space."""
-    if i64_at(item, MOVED) == 0:
+    """A world point in the item's object space; both carry the time."""
+    moved = i64_at(item, MOVED)
+    if moved == UNMOVED:
         return p
-    return transform_point(item, OBJECT_FROM_WORLD, p)
+    q = point_in_moving(table_at(item, MET), p) if moved == MOVING else transform_point(item, OBJECT_FROM_WORLD, p)
+    return Vec3(q.x, q.y, q.z, p.w)

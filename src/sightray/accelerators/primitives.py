@@ -102,7 +102,7 @@ def open_scene(space: Space, row: Table, lower: np.ndarray, upper: np.ndarray, t
     pointers = space.array(aligned(2 * len(things) + 2, np.int64))
     pairs, low, high, corners = [], [], [], []
     for index, thing in enumerate(things):
-        if not isinstance(thing.shape, Mesh):
+        if not isinstance(thing.shape, Mesh) or thing.placement is not None:  # what moves is one primitive
             pairs.append(np.array([(index, -1)]))
             low.append(lower[index : index + 1])
             high.append(upper[index : index + 1])

@@ -1,12 +1,11 @@
 """Building the tree that `bvh8` walks, by the surface area heuristic over sixteen bins an axis.
 
-A node begins with one child, its whole range of items, and splits the child of the largest surface until there are eight
-or only leaves are left. A split puts the items' centres into bins along each axis and takes the border between bins that
-minimises area x number of leaves, summed over both sides: the expected work of a ray that meets the parent.
+All items are one range, which is split in two, and so on until at most `leaf_size` items are left. A split puts the items'
+centres into bins along each axis and takes the border between bins that minimises area x number of leaves, summed over
+both sides: the expected work of a ray that meets the range. Then `collapse` makes nodes of eight of the ranges.
 
-Ranges with nothing to choose (all centres coincide) are halved as they lie, and so is everything below `SAH_LEVELS`:
-after that each level at least halves a range, so that a tree over 2^26 items has at most `MAX_LEVELS` levels and no
-traversal stack overflows, whatever the input.
+Ranges with nothing to choose (all centres coincide) are halved as they lie. So are all below a number of levels, if a tree
+would otherwise be so deep that a ray's stack overflows, whatever the input: halving alone makes at most 26 levels.
 
 While building, a box is eight floats: its lower corner and 0, its negated upper corner and 0. So the union of two boxes is
 one minimum. A *range* of items (a child in the making, or what fell into a bin) is a row of its box and a count.
@@ -26,10 +25,19 @@ from typing import NamedTuple
 import numpy as np
 
 from sightray._jit import is_compiled, kernel, native
-from sightray.bvh.bvh8 import CENTER, CHILDREN, HALF, LEAF, MAX_LEVELS, NODE_FLOATS, NODES, SCALE, int_at
+from sightray.bvh.bvh8 import CENTER, HALF, NODE_FLOATS, NODES, SCALE, int_at
+from sightray.bvh.collapse import (
+    COUNT,
+    FIRST,
+    HALVES,
+    PLAN_WORDS,
+    RANGE_WORDS,
+    collapse,
+    half_area,
+    plan_ranges,
+)
 from sightray.mathlib.lanes import (
     F32x4,
-    F32x8,
     extract4,
     high4,
     load4,
@@ -48,7 +56,6 @@ from sightray.mathlib.table import (
     Table,
     advance,
     aligned,
-    f32_at,
     f32_put,
     f64_at,
     f64_put,
@@ -60,12 +67,9 @@ from sightray.mathlib.table import (
 )
 
 BINS = 16
-SAH_LEVELS = 26
+SAH_LEVELS = (48, 24, 0)  # levels divided by area; the next smaller number if a ray might need too high a stack
 MAX_ITEMS = 1 << 26
 FEW = 64  # items that Python handles in a tenth of a second
-assert SAH_LEVELS + 28 <= MAX_LEVELS
-
-FIRST, COUNT, RANGE_WORDS = 4, 5, 8  # words of a range after those of its box
 
 
 class Bvh8(NamedTuple):
@@ -116,13 +120,18 @@ def build_tree(boxes: np.ndarray, leaf_size: int) -> tuple[np.ndarray, np.ndarra
         raise ValueError(f"got {n} items; allowed: up to {MAX_ITEMS} in one tree")
     if leaf_size not in (1, 2, 4):
         raise ValueError(f"leaf size: got {leaf_size}; allowed: 1, 2, 4")
-    # A node whose children are all leaves has more than leaf_size items below it; any other has eight children.
-    capacity = 2 + n // 7 + 6 * n // (7 * (leaf_size + 1))
-    nodes = aligned((capacity, NODE_FLOATS), np.float32)
     order = np.arange(n, dtype=np.int32)
-    used = runnable(build_nodes, n)(Table(boxes), Table(order), n, leaf_size, Table(nodes))
-    fitting = aligned((used, NODE_FLOATS), np.float32)
-    fitting[:] = nodes[:used]
+    ranges = aligned((max(2 * n, 2), RANGE_WORDS), np.int64)
+    for sah_levels in SAH_LEVELS:
+        used = runnable(divide, n)(Table(boxes), Table(order), n, leaf_size, sah_levels, Table(ranges))
+        plans = aligned((used, PLAN_WORDS), np.int64)
+        runnable(plan_ranges, n)(Table(ranges), used, Table(plans))
+        nodes = aligned((1 + used // 2, NODE_FLOATS), np.float32)
+        filled = runnable(collapse, n)(Table(ranges), Table(plans), leaf_size, Table(nodes))
+        if filled > 0:
+            break
+    fitting = aligned((filled, NODE_FLOATS), np.float32)
+    fitting[:] = nodes[:filled]
     return fitting, order
 
 
@@ -144,72 +153,27 @@ def pack_tree(space: Space, row: Table, tree: Bvh8) -> None:
 
 
 @kernel
-def build_nodes(boxes: Table, order: Table, n: i64, leaf_size: i64, nodes: Table) -> i64:
-    """Fill `nodes` and permute `boxes` and `order`; the number of nodes."""
-    todo = scratch(1536)  # nodes to fill: number, first item, count, level; as high as a traversal stack gets
-    children = scratch(64)
+def divide(boxes: Table, order: Table, n: i64, leaf_size: i64, sah_levels: i64, ranges: Table) -> i64:
+    """Divide all items into ranges of at most `leaf_size` (see `collapse`), permuting them; the number of ranges."""
+    todo = scratch(256)  # ranges to divide, and their levels
+    set_range(boxes, ranges, 0, n)
     i64_put(todo, 0, 0)
     i64_put(todo, 1, 0)
-    i64_put(todo, 2, n)
-    i64_put(todo, 3, 0)
     top, used = 1, 1
     while top > 0:
         top -= 1
-        node, level = i64_at(todo, 4 * top), i64_at(todo, 4 * top + 3)
-        set_range(boxes, children, i64_at(todo, 4 * top + 1), i64_at(todo, 4 * top + 2))
-        number = 1
-        while number < 8:
-            widest = widest_child(children, number, leaf_size)
-            if widest < 0:
-                break
-            child, other = advance(children, widest * RANGE_WORDS), advance(children, number * RANGE_WORDS)
-            split(boxes, order, child, other, leaf_size, level < SAH_LEVELS)
-            number += 1
-        for k in range(8):
-            child = advance(children, k * RANGE_WORDS)
-            count = i64_at(child, COUNT) if k < number else 0
-            code = 0
-            if count > leaf_size:  # a node, to be filled later
-                i64_put(todo, 4 * top, used)
-                i64_put(todo, 4 * top + 1, i64_at(child, FIRST))
-                i64_put(todo, 4 * top + 2, count)
-                i64_put(todo, 4 * top + 3, level + 1)
-                code = used
-                top += 1
-                used += 1
-            elif count > 0:
-                code = LEAF + 8 * i64_at(child, FIRST) + count
-            put_child(nodes, node * NODE_FLOATS + k, child, code)
+        row, level = advance(ranges, i64_at(todo, 2 * top) * RANGE_WORDS), i64_at(todo, 2 * top + 1)
+        if i64_at(row, COUNT) <= leaf_size:
+            i64_put(row, HALVES, 0)
+            continue
+        i64_put(row, HALVES, used)
+        split(boxes, order, row, advance(ranges, used * RANGE_WORDS), leaf_size, level < sah_levels)
+        for half in range(2):
+            i64_put(todo, 2 * top, used + half)
+            i64_put(todo, 2 * top + 1, level + 1)
+            top += 1
+        used += 2
     return used
-
-
-@kernel
-def put_child(nodes: Table, at: i64, child: Table, code: i64) -> None:
-    """Write a child's box and code to its lane of a node; an empty box if it has no code."""
-    for axis in range(3):
-        f32_put(nodes, at + 16 * axis, float(f32_at(child, axis)) if code > 0 else math.inf)
-        f32_put(nodes, at + 16 * axis + 8, -float(f32_at(child, 4 + axis)) if code > 0 else -math.inf)
-    i32_put(nodes, at + CHILDREN, code)
-
-
-@kernel
-def widest_child(children: Table, number: i64, leaf_size: i64) -> i64:
-    """Which child to split: that of the largest surface that is no leaf yet; -1 if all are."""
-    widest, area = -1, -1.0
-    for k in range(number):
-        child = advance(children, k * RANGE_WORDS)
-        its = half_area(load8(child, 0))
-        if i64_at(child, COUNT) > leaf_size and its > area:
-            widest, area = k, its
-    return widest
-
-
-@kernel(exact=True)
-def half_area(box: F32x8) -> f64:
-    """Half the surface of a box."""
-    e = low4(box) + high4(box)  # negated extents
-    x, y, z = extract4(e, 0), extract4(e, 1), extract4(e, 2)
-    return x * y + y * z + z * x
 
 
 @kernel
@@ -224,10 +188,10 @@ def set_range(boxes: Table, child: Table, first: i64, count: i64) -> None:
 
 
 @kernel
-def split(boxes: Table, order: Table, child: Table, other: Table, leaf_size: i64, by_area: bool) -> None:
-    """Divide the range `child` into itself and `other`."""
-    first, count = i64_at(child, FIRST), i64_at(child, COUNT)
-    left = count // 2
+def split(boxes: Table, order: Table, whole: Table, halves: Table, leaf_size: i64, by_area: bool) -> None:
+    """Divide a range into two, the rows of `halves`."""
+    first, count = i64_at(whole, FIRST), i64_at(whole, COUNT)
+    upper = advance(halves, RANGE_WORDS)
     if by_area:
         bins = scratch(384)
         grid = fill_bins(boxes, first, count, bins)
@@ -235,8 +199,23 @@ def split(boxes: Table, order: Table, child: Table, other: Table, leaf_size: i64
         if border > 0:
             axis = border // BINS
             left = partition(boxes, order, first, count, grid, axis, border - axis * BINS)
-    set_range(boxes, child, first, left)
-    set_range(boxes, other, first + left, count - left)
+            join_bins(bins, axis * BINS, border, first, halves)
+            join_bins(bins, border, axis * BINS + BINS, first + left, upper)
+            return
+    set_range(boxes, halves, first, count // 2)
+    set_range(boxes, upper, first + count // 2, count - count // 2)
+
+
+@kernel
+def join_bins(bins: Table, begin: i64, end: i64, first: i64, target: Table) -> None:
+    """Make `target` the range of what fell into the bins from `begin` to before `end`, items from `first` on."""
+    box, count = splat8(math.inf), 0
+    for b in range(begin, end):
+        box = vmin8(box, load8(bins, 16 * b))
+        count += i64_at(bins, 8 * b + COUNT)
+    store8(target, 0, box)
+    i64_put(target, FIRST, first)
+    i64_put(target, COUNT, count)
 
 
 class Grid(NamedTuple):

@@ -17,74 +17,70 @@ from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.bvh.bvh8 import (
+    BOTTOM,
     CHILD,
     LEAF,
     NODE_FLOATS,
     NODES,
     STACK_WORDS,
     BoxRay,
-    push_children,
-    push_children_unsorted,
+    int_at,
+    pop_near,
+    visit_last,
+    visit_nearest,
 )
 from sightray.bvh.casting import (
+    ALONG,
     DIRECTION,
     END,
+    END_AT,
+    FAR,
+    FROM,
+    LANE_WORDS,
+    NEAR,
     ORIGIN,
     PACKET_WORDS,
+    PLANES,
     PRIM,
-    REACH,
+    SIDE,
     SLACK,
     SPEED,
     START,
+    TO,
     WORK_WORDS,
-    box_packet,
-    triangle_packet,
+    R,
 )
-from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, TriangleRay, filter_block, meet_triangle, shear
+from sightray.bvh.triangles import (
+    BLOCK_FLOATS,
+    BLOCKS,
+    INDICES,
+    NUMBERS,
+    VERTICES,
+    TriangleRay,
+    filter_block,
+    meet_triangle,
+    shear,
+)
 from sightray.mathlib.lanes import (
-    load16d,
+    load16,
     lowest_bit,
     prefetch,
-    round16,
-    sort_key,
+    put_ints16,
+    select16d,
     splat4,
     splat8,
-    store16,
+    splat16,
+    splat16d,
 )
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, advance, f32_at, f32_put, f64_at, f64_put, i64_at, i64_put, scratch, table_at
+from sightray.mathlib.table import Table, advance, f32_at, f32_put, f64_at, f64_put, i64_at, i64_put, table_at
 from sightray.mathlib.vec import Vec3
 
-BOTTOM = -(1 << 62)  # below all keys: the end of a stack
 STRIDE = STACK_WORDS + 8  # words from stack to stack; one line more, lest all begin in the same set of the cache
 
-# Floats of the rays of a bundle, sixteen each.
-R, NEAR, FAR, FROM, TO, SIDE, ALONG, END_AT = 0, 48, 96, 144, 192, 240, 256, 272
-LANE_WORDS = 144
-
-
-@kernel
-def store_lanes(work: Table, lanes: Table) -> None:
-    """Write the rays of a packet as `bundles` reads them."""
-    boxes, triangles = box_packet(work), triangle_packet(work)
-    store16(lanes, R, boxes.rx)
-    store16(lanes, R + 16, boxes.ry)
-    store16(lanes, R + 32, boxes.rz)
-    store16(lanes, NEAR, boxes.nx)
-    store16(lanes, NEAR + 16, boxes.ny)
-    store16(lanes, NEAR + 32, boxes.nz)
-    store16(lanes, FAR, boxes.fx)
-    store16(lanes, FAR + 16, boxes.fy)
-    store16(lanes, FAR + 32, boxes.fz)
-    store16(lanes, FROM, triangles.ox)
-    store16(lanes, FROM + 16, triangles.oy)
-    store16(lanes, FROM + 32, triangles.oz)
-    store16(lanes, TO, triangles.dx)
-    store16(lanes, TO + 16, triangles.dy)
-    store16(lanes, TO + 32, triangles.dz)
-    store16(lanes, SIDE, triangles.side)
-    store16(lanes, ALONG, triangles.along)
-    store16(lanes, END_AT, round16(load16d(work, REACH)))
+# Words of the room that the rays of a bundle take: what each visits next, its stack's height, what waits, and its stack.
+NEXT, TOPS, WAITING, STACKS = 0, 64, 128, 192
+BUNDLE_WORDS = STACKS + 64 * STRIDE
 
 
 @kernel
@@ -95,7 +91,7 @@ def box_ray_of(lanes: Table, k: i64) -> BoxRay:
         splat8(x), splat8(y), splat8(z),
         splat8(float_at(lanes, NEAR + k)), splat8(float_at(lanes, NEAR + 16 + k)), splat8(float_at(lanes, NEAR + 32 + k)),
         splat8(float_at(lanes, FAR + k)), splat8(float_at(lanes, FAR + 16 + k)), splat8(float_at(lanes, FAR + 32 + k)),
-        0 if x > 0.0 else 8, 16 if y > 0.0 else 24, 32 if z > 0.0 else 40,
+        int_at(lanes, PLANES + k), int_at(lanes, PLANES + 16 + k), int_at(lanes, PLANES + 32 + k),
     )  # fmt: skip
 
 
@@ -122,12 +118,6 @@ def work_of(k: i64) -> i64:
 
 
 @kernel
-def float_of(k: i64) -> i64:
-    """The same for their lanes, in floats."""
-    return (k >> 4) * (2 * LANE_WORDS) + (k & 15)
-
-
-@kernel
 def float_at(table: Table, index: i64) -> f64:
     """Float number `index` of a table as a double."""
     return float(f32_at(table, index))
@@ -150,133 +140,162 @@ def prefetch_child(nodes: Table, blocks: Table, child: i64) -> None:
     prefetch(table, at + (48 if child < LEAF else 32))
 
 
+@kernel
+def prefetch_corners(mesh: Table, block: i64, maybe: i64) -> None:
+    """Ask for the corners of triangles of a block, two lines each, and for their numbers."""
+    vertices, blocks = table_at(mesh, VERTICES), table_at(mesh, BLOCKS)
+    prefetch(table_at(mesh, NUMBERS), 4 * block)
+    while maybe != 0:
+        at = block * BLOCK_FLOATS + INDICES + lowest_bit(maybe)
+        maybe &= maybe - 1
+        for corner in range(3):
+            vertex = 6 * int_at(blocks, at + 4 * corner)
+            prefetch(vertices, vertex)
+            prefetch(vertices, vertex + 4)
+
+
 class Bundle(NamedTuple):
-    """Sixteen rays on their way, a bit each."""
+    """Rays on their way, a bit each."""
 
-    alive: i64  # rays that have something left to visit
-    leaf: i64  # rays that visit a leaf next, if they are alive
-
-
-@kernel
-def next_visit(now: Bundle, k: i64, child: i64, done: bool) -> Bundle:
-    """Note that ray k is done, or visits `child` next."""
-    leaf = (now.leaf & ~(1 << k)) | (child >> 30 & 1) << k
-    return Bundle(now.alive & ~((1 if done else 0) << k), leaf)
+    nodes: i64  # rays that visit a node next
+    leaves: i64  # rays that visit a leaf next
 
 
 @kernel
-def closest_in_turns(mesh: Table, packet: Table, t_min: f64, alive: i64, work: Table) -> i64:
-    """`closest_packet` for the rays `alive`, each on its own."""
-    lanes = scratch(576)
+def board(alive: i64, all_lanes: Table, room: Table) -> None:
+    """Prepare the rays `alive`: where nodes have their planes, empty stacks, and the root as what they visit next."""
     for p in range(4):
         if (alive >> (16 * p)) & 0xFFFF != 0:
-            store_lanes(advance(work, p * WORK_WORDS), advance(lanes, p * LANE_WORDS))
-    nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
-    stacks, tops = scratch(25088), scratch(64)
+            lanes = advance(all_lanes, p * LANE_WORDS)
+            for axis in range(3):
+                lower, upper = splat16d(16.0 * axis), splat16d(16.0 * axis + 8.0)
+                up = load16(lanes, R + 16 * axis) > splat16(0.0)
+                put_ints16(lanes, PLANES + 16 * axis, select16d(up, lower, upper))
     for k in range(64):
-        i64_put(stacks, k * STRIDE, BOTTOM)
-        i64_put(stacks, k * STRIDE + 1, 0)
-        i64_put(tops, k, 2)
-    now, found = Bundle(alive, 0), 0
-    while now.alive != 0:
-        # First all rays that visit a node, then all that visit a leaf: so the processor knows which comes next.
-        turn = now.alive & ~now.leaf
-        leaves = now.alive & now.leaf
+        i64_put(room, NEXT + k, 0)
+        i64_put(room, TOPS + k, 1)
+        i64_put(room, STACKS + k * STRIDE, BOTTOM)
+
+
+@kernel
+def proceed(mesh: Table, room: Table, now: Bundle, k: i64, key: i64, top: i64) -> Bundle:
+    """Note what ray k visits next and ask for its memory; the root means that nothing is left."""
+    i64_put(room, NEXT + k, key)
+    i64_put(room, TOPS + k, top)
+    child = key & CHILD
+    prefetch_child(table_at(mesh, NODES), table_at(mesh, BLOCKS), child)
+    leaf = child >> 30
+    node = 1 - leaf if child != 0 else 0
+    return Bundle(now.nodes | node << k, now.leaves | leaf << k)
+
+
+@kernel
+def closest_in_turns(
+    mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
+) -> i64:
+    """`closest_rays` for the rays `alive`, each on its own."""
+    board(alive, all_lanes, room)
+    nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
+    now, found, due = Bundle(alive, 0), 0, 0
+    while now.nodes | now.leaves | due != 0:
+        # First all rays that visit a node, then those that visit a leaf: so the processor knows which comes next.
+        turn, leaves, deciding = now.nodes, now.leaves, due
+        now, due = Bundle(0, 0), 0
         while turn != 0:
             k = lowest_bit(turn)
             turn &= turn - 1
-            stack, top, reach = advance(stacks, k * STRIDE), i64_at(tops, k) - 1, float_at(lanes, END_AT + float_of(k))
-            child = i64_at(stack, top) & CHILD
-            top = push_children(nodes, child, box_ray_of(lanes, float_of(k)), reach, stack, top)
-            top = drop_far(stack, top, reach)
-            i64_put(tops, k, top)
-            child = i64_at(stack, top - 1) & CHILD
-            prefetch_child(nodes, blocks, child)
-            now = next_visit(now, k, child, top == 1)
+            stack, top = advance(room, STACKS + k * STRIDE), i64_at(room, TOPS + k)
+            lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
+            reach = float_at(lanes, END_AT + (k & 15))
+            node = i64_at(room, NEXT + k) & CHILD
+            next = visit_nearest(nodes, node, box_ray_of(lanes, k & 15), reach, stack, top)
+            if not next.met:
+                next = pop_near(stack, top, reach)
+            now = proceed(mesh, room, now, k, next.key, next.top)
         while leaves != 0:
             k = lowest_bit(leaves)
             leaves &= leaves - 1
-            stack, top, reach = advance(stacks, k * STRIDE), i64_at(tops, k) - 1, float_at(lanes, END_AT + float_of(k))
-            block = i64_at(stack, top) & (LEAF - 1)
-            maybe = filter_block(blocks, block * BLOCK_FLOATS, triangle_ray_of(lanes, float_of(k)), reach).maybe
-            while maybe != 0:
-                o, d = packet_vec3(packet, ORIGIN + lane_of(k)), packet_vec3(packet, DIRECTION + lane_of(k))
-                hit = meet_triangle(mesh, block, lowest_bit(maybe), o, shear(d), t_min, math.inf)
-                maybe &= maybe - 1
-                end = f64_at(packet, END + lane_of(k))
-                known = int(f64_at(packet, PRIM + lane_of(k))) if found >> k & 1 != 0 else -1
-                if hit.t < end or (hit.t == end and hit.prim < known):
-                    found |= 1 << k
-                    f64_put(packet, END + lane_of(k), hit.t)
-                    f64_put(packet, PRIM + lane_of(k), float(hit.prim))
-                    reach = (
-                        hit.t * f64_at(work, SPEED + work_of(k))
-                        - f64_at(work, START + work_of(k))
-                        + f64_at(work, SLACK + work_of(k))
-                    )
-                    f32_put(lanes, END_AT + float_of(k), reach)
-            top = drop_far(stack, top, reach)
-            i64_put(tops, k, top)
-            child = i64_at(stack, top - 1) & CHILD
-            prefetch_child(nodes, blocks, child)
-            now = next_visit(now, k, child, top == 1)
+            lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
+            reach = float_at(lanes, END_AT + (k & 15))
+            block = i64_at(room, NEXT + k) & (LEAF - 1)
+            maybe = filter_block(blocks, block * BLOCK_FLOATS, triangle_ray_of(lanes, k & 15), reach).maybe
+            if maybe != 0:  # to be decided when the corners are there
+                prefetch_corners(mesh, block, maybe)
+                i64_put(room, WAITING + k, maybe)
+                due |= 1 << k
+            else:
+                stack, top = advance(room, STACKS + k * STRIDE), i64_at(room, TOPS + k)
+                next = pop_near(stack, top, reach)
+                now = proceed(mesh, room, now, k, next.key, next.top)
+        while deciding != 0:
+            k = lowest_bit(deciding)
+            deciding &= deciding - 1
+            stack, top = advance(room, STACKS + k * STRIDE), i64_at(room, TOPS + k)
+            lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
+            packet, work = advance(packets, lane_of(k)), advance(works, work_of(k))
+            found |= (1 if decide(mesh, packet, work, lanes, room, k, t_min, found >> k & 1 != 0) else 0) << k
+            next = pop_near(stack, top, float_at(lanes, END_AT + (k & 15)))
+            now = proceed(mesh, room, now, k, next.key, next.top)
     return found
 
 
 @kernel
-def drop_far(stack: Table, top: i64, reach: f64) -> i64:
-    """The stack's height without what lies farther than the best hit."""
-    farthest = sort_key(reach)
-    while i64_at(stack, top - 1) > farthest:
-        top -= 1
-    return top
+def decide(mesh: Table, packet: Table, work: Table, lanes: Table, room: Table, k: i64, t_min: f64, found: bool) -> bool:
+    """Meet ray k with the triangles that wait for it, and note what is nearer; whether it has met any so far."""
+    block, waiting = i64_at(room, NEXT + k) & (LEAF - 1), i64_at(room, WAITING + k)
+    o, d = packet_vec3(packet, ORIGIN), packet_vec3(packet, DIRECTION)
+    s = shear(d)
+    while waiting != 0:
+        hit = meet_triangle(mesh, block, lowest_bit(waiting), o, s, t_min, math.inf)
+        waiting &= waiting - 1
+        end = f64_at(packet, END)
+        # Of two triangles at the same place, the one with the smaller number counts.
+        if hit.t < end or (found and hit.t == end and hit.prim < int(f64_at(packet, PRIM))):
+            found = True
+            f64_put(packet, END, hit.t)
+            f64_put(packet, PRIM, float(hit.prim))
+            reach = hit.t * f64_at(work, SPEED) - f64_at(work, START) + f64_at(work, SLACK)
+            f32_put(lanes, END_AT + (k & 15), reach)
+    return found
 
 
 @kernel
-def any_in_turns(mesh: Table, packet: Table, t_min: f64, alive: i64, work: Table) -> i64:
-    """`any_packet` for the rays `alive`, each on its own."""
-    lanes = scratch(576)
-    for p in range(4):
-        if (alive >> (16 * p)) & 0xFFFF != 0:
-            store_lanes(advance(work, p * WORK_WORDS), advance(lanes, p * LANE_WORDS))
+def any_in_turns(
+    mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
+) -> i64:
+    """`any_rays` for the rays `alive`, each on its own."""
+    board(alive, all_lanes, room)
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
-    stacks, tops = scratch(25088), scratch(64)
-    for k in range(64):
-        i64_put(stacks, k * STRIDE, 0)
-        i64_put(stacks, k * STRIDE + 1, 0)
-        i64_put(tops, k, 2)
     now, blocked = Bundle(alive, 0), 0
-    while now.alive != 0:
-        turn = now.alive & ~now.leaf
-        leaves = now.alive & now.leaf
+    while now.nodes | now.leaves != 0:
+        turn, leaves = now.nodes, now.leaves
+        now = Bundle(0, 0)
         while turn != 0:
             k = lowest_bit(turn)
             turn &= turn - 1
-            stack, top, reach = advance(stacks, k * STRIDE), i64_at(tops, k) - 1, float_at(lanes, END_AT + float_of(k))
-            top = push_children_unsorted(nodes, i64_at(stack, top), box_ray_of(lanes, float_of(k)), reach, stack, top)
-            i64_put(tops, k, top)
-            child = i64_at(stack, top - 1)
-            prefetch_child(nodes, blocks, child)
-            now = next_visit(now, k, child, top == 1)
+            stack, top = advance(room, STACKS + k * STRIDE), i64_at(room, TOPS + k)
+            lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
+            reach = float_at(lanes, END_AT + (k & 15))
+            below = i64_at(stack, top - 1)
+            next = visit_last(nodes, i64_at(room, NEXT + k) & CHILD, box_ray_of(lanes, k & 15), reach, stack, top)
+            key, top = (next.key, next.top) if next.met else (below, top - 1)
+            now = proceed(mesh, room, now, k, key, top)
         while leaves != 0:
             k = lowest_bit(leaves)
             leaves &= leaves - 1
-            stack, top, reach = advance(stacks, k * STRIDE), i64_at(tops, k) - 1, float_at(lanes, END_AT + float_of(k))
-            block = i64_at(stack, top) & (LEAF - 1)
-            met = filter_block(blocks, block * BLOCK_FLOATS, triangle_ray_of(lanes, float_of(k)), reach)
+            lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
+            reach = float_at(lanes, END_AT + (k & 15))
+            block = i64_at(room, NEXT + k) & (LEAF - 1)
+            met = filter_block(blocks, block * BLOCK_FLOATS, triangle_ray_of(lanes, k & 15), reach)
             hit, maybe = met.surely != 0, met.maybe
             while maybe != 0 and not hit:
-                o, d = packet_vec3(packet, ORIGIN + lane_of(k)), packet_vec3(packet, DIRECTION + lane_of(k))
-                hit = (
-                    meet_triangle(
-                        mesh, block, lowest_bit(maybe), o, shear(d), t_min, f64_at(packet, END + lane_of(k))
-                    ).prim
-                    >= 0
-                )
+                packet = advance(packets, lane_of(k))
+                o, s = packet_vec3(packet, ORIGIN), shear(packet_vec3(packet, DIRECTION))
+                hit = meet_triangle(mesh, block, lowest_bit(maybe), o, s, t_min, f64_at(packet, END)).prim >= 0
                 maybe &= maybe - 1
-            blocked |= (1 if hit else 0) << k
-            i64_put(tops, k, top)
-            child = i64_at(stack, top - 1)
-            prefetch_child(nodes, blocks, child)
-            now = next_visit(now, k, child, hit or top == 1)
+            if hit:
+                blocked |= 1 << k
+            else:
+                top = i64_at(room, TOPS + k) - 1
+                now = proceed(mesh, room, now, k, i64_at(room, STACKS + k * STRIDE + top), top)
     return blocked

@@ -29,9 +29,17 @@ from typing import NamedTuple
 from sightray._jit import METHOD_SLOTS, kernel
 from sightray.mathlib.lanes import (
     F32x8,
+    Mask8,
+    count_bits,
+    highest_bit,
+    last8,
     load8,
     lowest_bit,
     movemask8,
+    push8,
+    push_before_last8,
+    sort8,
+    sort_key,
     splat8,
     store8,
     vmax8,
@@ -46,8 +54,9 @@ from sightray.mathlib.vec import Vec3, grey, max3, vabs, vmax, vmin
 NODE_FLOATS, CHILDREN = 64, 48
 LEAF = 1 << 30  # the bit that tells leaves from nodes
 CHILD = (1 << 32) - 1  # the half of a sort key that names the child
-STACK_WORDS = 384  # a node replaces itself by at most 8 others: 7 a level, and no tree has more levels than MAX_LEVELS
-MAX_LEVELS = 54
+STACK_WORDS = 192  # that a ray's stack has; see `collapse`, which makes no tree that needs more
+
+BOTTOM = -(1 << 62)  # below all keys, and names the root, which is no child: the end of a stack
 
 # The head of a row that has a tree.
 NODES = METHOD_SLOTS  # pointer to the nodes
@@ -128,7 +137,7 @@ class Met(NamedTuple):
     """What a ray finds at a node."""
 
     near: F32x8  # lengths to where it enters the children's boxes
-    bits: i64  # which children it meets
+    met: Mask8  # which children it meets
 
 
 @kernel
@@ -141,16 +150,19 @@ def meet_boxes(nodes: Table, node: i64, ray: BoxRay, reach: f64) -> Met:
     near_z, far_z = load8(nodes, at + ray.z) * ray.rz - ray.nz, load8(nodes, at + 72 - ray.z) * ray.rz - ray.fz
     near = vmax8(vmax8(near_x, near_y), vmax8(near_z, splat8(0.0)))
     far = vmin8(vmin8(far_x, far_y), vmin8(far_z, splat8(reach)))
-    return Met(near, movemask8(near <= far))
+    return Met(near, near <= far)
 
 
 @kernel
 def push_children(nodes: Table, node: i64, ray: BoxRay, reach: f64, stack: Table, top: i64) -> i64:
-    """Push keys of the children that the ray meets within `reach`, the nearest last; the stack's new height."""
-    met = meet_boxes(nodes, node, ray, reach)
+    """Push keys of the children that the ray meets within `reach`, the nearest last; the stack's new height.
+
+    A ray on its own waits for its next node: branches, which are usually guessed right, take less long than `visit_nearest`.
+    """
+    found = meet_boxes(nodes, node, ray, reach)
     lengths = scratch(4)
-    store8(lengths, 0, met.near)
-    bits, base = met.bits, top
+    store8(lengths, 0, found.near)
+    bits, base = movemask8(found.met), top
     while bits != 0:
         lane = lowest_bit(bits)
         bits &= bits - 1
@@ -167,10 +179,45 @@ def push_children(nodes: Table, node: i64, ray: BoxRay, reach: f64, stack: Table
 
 @kernel
 def push_children_unsorted(nodes: Table, node: i64, ray: BoxRay, reach: f64, stack: Table, top: i64) -> i64:
-    """Push the children that the ray meets within `reach`, in any order; the stack's new height."""
-    bits = meet_boxes(nodes, node, ray, reach).bits
-    while bits != 0:
-        i64_put(stack, top, int_at(nodes, node * NODE_FLOATS + CHILDREN + lowest_bit(bits)))
-        bits &= bits - 1
-        top += 1
-    return top
+    """Push the children that the ray meets within `reach`, in the node's order; the stack's new height."""
+    bits = movemask8(meet_boxes(nodes, node, ray, reach).met)
+    push8(stack, top, load8(nodes, node * NODE_FLOATS + CHILDREN), bits)
+    return top + count_bits(bits)
+
+
+class Next(NamedTuple):
+    """What comes after a node."""
+
+    key: i64  # the child to visit, with its distance as high half; void if none is met
+    top: i64  # the stack's height with all the others
+    met: bool
+
+
+@kernel
+def visit_nearest(nodes: Table, node: i64, ray: BoxRay, reach: f64, stack: Table, top: i64) -> Next:
+    """The nearest child that the ray meets within `reach`; keys of the others are pushed, nearer ones later."""
+    found = meet_boxes(nodes, node, ray, reach)
+    count = count_bits(movemask8(found.met))
+    keys = sort8(found.near, load8(nodes, node * NODE_FLOATS + CHILDREN), found.met)
+    push_before_last8(stack, top, keys, count)
+    return Next(last8(keys), top + max(count - 1, 0), count > 0)
+
+
+@kernel
+def visit_last(nodes: Table, node: i64, ray: BoxRay, reach: f64, stack: Table, top: i64) -> Next:
+    """The last child in the node's order that the ray meets within `reach`; the others are pushed."""
+    bits = movemask8(meet_boxes(nodes, node, ray, reach).met)
+    last = highest_bit(bits | 1)
+    push8(stack, top, load8(nodes, node * NODE_FLOATS + CHILDREN), bits & ~(1 << last))
+    child = int_at(nodes, node * NODE_FLOATS + CHILDREN + last)
+    return Next(child, top + max(count_bits(bits) - 1, 0), bits != 0)
+
+
+@kernel
+def pop_near(stack: Table, top: i64, reach: f64) -> Next:
+    """The highest key on the stack that is not farther than `reach`; what is above is dropped."""
+    farthest = sort_key(reach)
+    top -= 1
+    while i64_at(stack, top) > farthest:
+        top -= 1
+    return Next(i64_at(stack, top), top, top > 0)

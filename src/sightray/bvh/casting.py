@@ -15,14 +15,15 @@ from typing import NamedTuple
 from sightray._jit import kernel
 from sightray.bvh.bvh8 import CENTER, HALF, SCALE
 from sightray.mathlib.lanes import (
-    F32x16,
     abs16d,
+    load16,
     load16d,
     movemask16,
     round16,
     select16d,
     splat16,
     splat16d,
+    store16,
     store16d,
     vmax16d,
     vmin16d,
@@ -33,14 +34,20 @@ from sightray.mathlib.table import Table, f64_at
 ORIGIN, DIRECTION, END, PRIM = 0, 48, 96, 112
 PACKET_WORDS = 128
 
-# Words of the working memory of a packet, sixteen lanes each: rays in the unit frame, and what the decision needs.
-UNIT_O, UNIT_D, UNIT_R, REACH, SLACK, SPEED, START, SHEAR, BEST = 0, 48, 96, 144, 160, 176, 192, 208, 256
-WORK_WORDS = 272
+# Words of the working memory of a packet, sixteen doubles each: what the decision needs, and rays in the unit frame.
+SLACK, SPEED, START, SHEAR, UNIT_O, UNIT_R = 0, 16, 32, 48, 96, 144
+WORK_WORDS = 192
+
+# Floats of a packet's lanes, sixteen each, as boxes and triangles need them: x * R - NEAR is the length to a near plane x,
+# x * R - FAR to a far one; origins and directions in the unit frame; slacks, see `TriangleRay`; and where rays end. Then,
+# as integers, where a node has their near planes.
+R, NEAR, FAR, FROM, TO, SIDE, ALONG, END_AT, PLANES = 0, 48, 96, 144, 192, 240, 256, 272, 288
+LANE_WORDS = 168
 
 
 @kernel
-def cast_packet(mesh: Table, packet: Table, t_min: f64, work: Table) -> i64:
-    """Bring a packet into the tree's unit frame, as `unit_ray` does: fills `work`; the bits of rays that meet the box."""
+def cast_packet(mesh: Table, packet: Table, t_min: f64, work: Table, lanes: Table) -> i64:
+    """Bring a packet into the tree's unit frame, as `unit_ray` does: fills `work` and `lanes`; who meets the tree's box."""
     scale, zero = splat16d(f64_at(mesh, SCALE)), splat16d(0.0)
     huge = splat16d(1e200)
     speed, slack, total = zero, zero, zero
@@ -69,93 +76,43 @@ def cast_packet(mesh: Table, packet: Table, t_min: f64, work: Table) -> i64:
     )
     reach = select16d(fit, (last - first) * speed, splat16d(-1.0))
     met = reach >= zero
-    reach = select16d(met, reach, splat16d(-1.0))
-    store16d(work, REACH, reach)
+    store16(lanes, END_AT, round16(select16d(met, reach, splat16d(-1.0))))
     store16d(work, SLACK, slack)
     store16d(work, SPEED, speed)
     store16d(work, START, first * speed)
+    store16(lanes, SIDE, round16(splat16d(16.0) * slack))
+    store16(lanes, ALONG, round16(splat16d(3.0) * slack))
 
     # Of rays that miss the box nothing is asked; where the others start is brought near the tree.
     for axis in range(3):
-        o, d = load16d(work, UNIT_O + 16 * axis), load16d(packet, DIRECTION + 16 * axis) * scale
-        store16d(work, UNIT_O + 16 * axis, select16d(met, o + d * first, zero))
-        store16d(work, UNIT_D + 16 * axis, select16d(met, d * unit, zero))
+        d, r = load16d(packet, DIRECTION + 16 * axis) * scale, load16d(work, UNIT_R + 16 * axis)
+        o = select16d(met, load16d(work, UNIT_O + 16 * axis) + d * first, zero)
+        store16(lanes, R + 16 * axis, round16(r))
+        store16(lanes, NEAR + 16 * axis, round16(o * r + abs16d(r) * slack))
+        store16(lanes, FAR + 16 * axis, round16(o * r - abs16d(r) * slack))
+        store16(lanes, FROM + 16 * axis, round16(o))
+        store16(lanes, TO + 16 * axis, round16(select16d(met, d * unit, zero)))
     return movemask16(met)
-
-
-@kernel
-def share(packet: Table, work: Table, bits: i64) -> Shared:
-    """What the rays `bits` of a packet have in common."""
-    up_x = movemask16(load16d(work, UNIT_R) > splat16d(0.0)) & bits
-    up_y = movemask16(load16d(work, UNIT_R + 16) > splat16d(0.0)) & bits
-    up_z = movemask16(load16d(work, UNIT_R + 32) > splat16d(0.0)) & bits
-    x, y, z = abs16d(load16d(packet, 48)), abs16d(load16d(packet, 64)), abs16d(load16d(packet, 80))
-    by_z, by_y = movemask16((z >= x) & (z >= y)) & bits, movemask16(y >= x) & bits
-    same = (up_x == 0 or up_x == bits) and (up_y == 0 or up_y == bits) and (up_z == 0 or up_z == bits)
-    same &= by_z == bits or (by_z == 0 and (by_y == bits or by_y == 0))
-    return Shared(same, up_x != 0, up_y != 0, up_z != 0, 2 if by_z != 0 else 1 if by_y != 0 else 0)
 
 
 class Shared(NamedTuple):
     """What the rays of a packet have in common."""
 
     same: bool  # the rest is void if they do not share all of it
-    x_up: bool  # whether they go up the axes
-    y_up: bool
-    z_up: bool
+    octant: i64  # bit i is set if they go up axis i
     axis: i64  # of their largest component
 
 
-class BoxPacket(NamedTuple):
-    """What meets a box, for each ray: x * rx - nx is the length to a near plane x, x * rx - fx to a far one."""
-
-    rx: F32x16
-    ry: F32x16
-    rz: F32x16
-    nx: F32x16
-    ny: F32x16
-    nz: F32x16
-    fx: F32x16
-    fy: F32x16
-    fz: F32x16
-
-
 @kernel
-def near_lanes(work: Table, axis: i64, sign: f64) -> F32x16:
-    """Origin times reciprocal direction, moved by the slack: ahead if `sign` is 1, back if it is -1."""
-    r = load16d(work, UNIT_R + 16 * axis)
-    return round16(load16d(work, UNIT_O + 16 * axis) * r + abs16d(r) * load16d(work, SLACK) * splat16d(sign))
-
-
-@kernel
-def box_packet(work: Table) -> BoxPacket:
-    """Prepare a packet for boxes."""
-    return BoxPacket(
-        round16(load16d(work, UNIT_R)), round16(load16d(work, UNIT_R + 16)), round16(load16d(work, UNIT_R + 32)),
-        near_lanes(work, 0, 1.0), near_lanes(work, 1, 1.0), near_lanes(work, 2, 1.0),
-        near_lanes(work, 0, -1.0), near_lanes(work, 1, -1.0), near_lanes(work, 2, -1.0),
-    )  # fmt: skip
-
-
-class TrianglePacket(NamedTuple):
-    """What meets a triangle, for each ray; as `TriangleRay`."""
-
-    ox: F32x16
-    oy: F32x16
-    oz: F32x16
-    dx: F32x16
-    dy: F32x16
-    dz: F32x16
-    side: F32x16
-    along: F32x16
-
-
-@kernel
-def triangle_packet(work: Table) -> TrianglePacket:
-    """Prepare a packet for triangles."""
-    slack = round16(load16d(work, SLACK))
-    return TrianglePacket(
-        round16(load16d(work, UNIT_O)), round16(load16d(work, UNIT_O + 16)), round16(load16d(work, UNIT_O + 32)),
-        round16(load16d(work, UNIT_D)), round16(load16d(work, UNIT_D + 16)), round16(load16d(work, UNIT_D + 32)),
-        splat16(16.0) * slack, splat16(3.0) * slack,
-    )  # fmt: skip
+def share(packet: Table, lanes: Table, bits: i64) -> Shared:
+    """What the rays `bits` of a packet have in common."""
+    zero = splat16(0.0)
+    up_x = movemask16(load16(lanes, R) > zero) & bits
+    up_y = movemask16(load16(lanes, R + 16) > zero) & bits
+    up_z = movemask16(load16(lanes, R + 32) > zero) & bits
+    x, y, z = abs16d(load16d(packet, 48)), abs16d(load16d(packet, 64)), abs16d(load16d(packet, 80))
+    by_z, by_y = movemask16((z >= x) & (z >= y)) & bits, movemask16(y >= x) & bits
+    same = (up_x == 0 or up_x == bits) and (up_y == 0 or up_y == bits) and (up_z == 0 or up_z == bits)
+    same &= by_z == bits or (by_z == 0 and (by_y == bits or by_y == 0))
+    octant = (1 if up_x != 0 else 0) | (2 if up_y != 0 else 0) | (4 if up_z != 0 else 0)
+    return Shared(same, octant, 2 if by_z != 0 else 1 if by_y != 0 else 0)

@@ -31,6 +31,7 @@ import numpy as np
 from sightray._jit import kernel
 from sightray.bvh.binned_sah import Bvh8, build_tree, pack_tree, runnable, unit_frame
 from sightray.bvh.bvh8 import (
+    BOTTOM,
     CHILD,
     CHILDREN,
     LEAF,
@@ -42,9 +43,10 @@ from sightray.bvh.bvh8 import (
     box_ray,
     int_at,
     push_children,
-    push_children_unsorted,
     unit_ray,
+    visit_last,
 )
+from sightray.bvh.shadow_order import order_children
 from sightray.mathlib.hit import Hit, is_hit, miss
 from sightray.mathlib.lanes import (
     F32x4,
@@ -109,6 +111,8 @@ def build_mesh(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
     leaves = int(np.count_nonzero(nodes.view(np.int32)[:, CHILDREN : CHILDREN + 8] >= LEAF))
     blocks, numbers = aligned((leaves, BLOCK_FLOATS), np.float32), aligned((leaves, 4), np.int32)
     runnable(pack_blocks, n)(*inputs, Table(nodes), len(nodes), Table(order), Table(blocks), Table(numbers))
+    worth = aligned((len(nodes), 2), np.float64)
+    runnable(order_children, n)(Table(nodes), len(nodes), Table(blocks), BLOCK_FLOATS, Table(worth))
     return MeshTree(Bvh8(nodes, order, center, half, scale), blocks, numbers, vertices, faces)
 
 
@@ -347,21 +351,24 @@ def any_triangle(mesh: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
     boxes, lanes = box_ray(unit), triangle_ray(unit)
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
     stack = scratch(STACK_WORDS)
-    i64_put(stack, 0, 0)
-    top = 1
+    i64_put(stack, 0, BOTTOM)
+    child, top = 0, 1
     while top > 0:
+        if child < LEAF:
+            next = visit_last(nodes, child, boxes, unit.reach, stack, top)
+            if next.met:
+                child, top = next.key, next.top
+                continue
+        else:
+            block = child & (LEAF - 1)
+            found = filter_block(blocks, block * BLOCK_FLOATS, lanes, unit.reach)
+            if found.surely != 0:
+                return True
+            maybe = found.maybe
+            while maybe != 0:
+                if is_hit(meet_triangle(mesh, block, lowest_bit(maybe), o, shear(d), t_min, t_max)):
+                    return True
+                maybe &= maybe - 1
         top -= 1
         child = i64_at(stack, top)
-        if child < LEAF:
-            top = push_children_unsorted(nodes, child, boxes, unit.reach, stack, top)
-            continue
-        block = child & (LEAF - 1)
-        found = filter_block(blocks, block * BLOCK_FLOATS, lanes, unit.reach)
-        if found.surely != 0:
-            return True
-        maybe = found.maybe
-        while maybe != 0:
-            if is_hit(meet_triangle(mesh, block, lowest_bit(maybe), o, shear(d), t_min, t_max)):
-                return True
-            maybe &= maybe - 1
     return False

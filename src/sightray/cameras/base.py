@@ -24,7 +24,7 @@ MAX_SIDE = 65_536
 
 
 class Ray(NamedTuple):
-    """A ray of sight: unit direction."""
+    """A ray of sight: unit direction, or one of length zero, which meets nothing, where a pixel sees nothing."""
 
     origin: Vec3  # its 4th lane is the time, seconds
     direction: Vec3
@@ -39,6 +39,7 @@ class Camera(Member, family="cameras"):
     shutter_close: float = number("when it ends; the same for a picture of an instant", default=0.0, unit="s")
     readout: float = number("how much later the bottom row is exposed (rolling shutter)", default=0.0, unit="s")
     _spread: Any = derived_number("angle between neighbouring rays of sight, rad", lambda c: c.pixel_angle())
+    _apart: Any = derived_number("distance between where neighbouring rays start, m", lambda c: c.pixel_distance())
 
     def world_from_camera(self) -> np.ndarray:
         """Pose, (4, 4) float64: columns +x right, +y down, +z forward, and the eye."""
@@ -66,7 +67,8 @@ class Camera(Member, family="cameras"):
 
         Returns
         -------
-        origins, directions : (..., 3) float64 each, metres, world; directions have unit length.
+        origins, directions : (..., 3) float64 each, metres, world; directions have unit length, or length zero where
+        the pixel sees nothing, as outside the image circle of a fisheye lens.
         """
         raise NotImplementedError(f"{type(self).__name__} cannot list its rays")
 
@@ -81,6 +83,12 @@ class Camera(Member, family="cameras"):
         _, (a, b) = self.rays([(x - 0.5, y), (x + 0.5, y)])
         return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
+    def pixel_distance(self) -> float:
+        """Distance between where the rays of the two pixels in the middle start, metres; 0 if all leave one point."""
+        x, y = self.width / 2, self.height / 2
+        (a, b), _ = self.rays([(x - 0.5, y), (x + 0.5, y)])
+        return float(np.linalg.norm(b - a))
+
     def check(self) -> None:
         if self.shutter_close < self.shutter_open:
             raise SceneError(
@@ -93,7 +101,7 @@ class Camera(Member, family="cameras"):
         return self.replace(width=width, height=height)
 
 
-WIDTH, HEIGHT, SHUTTER_OPEN, SHUTTER_CLOSE, READOUT, SPREAD = Camera.offsets()
+WIDTH, HEIGHT, SHUTTER_OPEN, SHUTTER_CLOSE, READOUT, SPREAD, APART = Camera.offsets()
 
 
 @method(0)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sightray.cameras.base import _Pinhole, look_at
+from sightray.cameras.base import _Pinhole, look_at, rolled
 from sightray.fields import Point, number, vector
 
 
@@ -29,11 +29,7 @@ class PerspectiveCamera(_Pinhole):
         self.world_from_camera()
 
     def world_from_camera(self) -> np.ndarray:
-        pose = look_at(self.eye, self.target, self.up, "PerspectiveCamera")
-        c, s = math.cos(math.radians(self.roll)), math.sin(math.radians(self.roll))
-        turn = np.eye(4)
-        turn[:2, :2] = [[c, -s], [s, c]]
-        return pose @ turn
+        return rolled(look_at(self.eye, self.target, self.up, type(self).__name__), self.roll)
 
     def intrinsics(self) -> np.ndarray:
         fy = 0.5 * self.height / math.tan(math.radians(self.vfov) / 2)

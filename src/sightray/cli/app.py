@@ -9,8 +9,23 @@ from typing import Annotated
 import typer
 
 from sightray.cli.bench import bench
-from sightray.cli.common import HEIGHT, INTEGRATOR, LIMIT, SCENE, SEED, WIDTH, limits, named_integrator, resized
+from sightray.cli.common import (
+    HEIGHT,
+    INTEGRATOR,
+    LIMIT,
+    SAMPLER,
+    SCENE,
+    SEED,
+    WIDTH,
+    contrast_or_error,
+    limits,
+    named_integrator,
+    named_sampler,
+    resized,
+)
+from sightray.cli.dataset import dataset
 from sightray.cli.heatmap import heatmap
+from sightray.cli.label import label
 
 app = typer.Typer(
     help="Sightray follows rays of sight through scenes: pictures to look at and pictures to measure.",
@@ -18,6 +33,8 @@ app = typer.Typer(
 )  # fmt: skip
 app.add_typer(bench)
 app.command()(heatmap)
+app.command()(label)
+app.command()(dataset)
 
 
 @app.command()
@@ -26,19 +43,28 @@ def render(
     output: Annotated[Path | None, typer.Option("--output", "-o", help=".png .jpg .exr .hdr .pfm .npy")] = None,
     integrator: INTEGRATOR = None,
     samples: Annotated[int | None, typer.Option(help="Rays of sight per pixel.")] = None,
-    adaptive: Annotated[
-        float | None, typer.Option(help="More samples where neighbours' contrast is above this, 0 to 1.")
+    time: Annotated[float | None, typer.Option(help="Seconds of rendering.")] = None,
+    target_error: Annotated[
+        float | None, typer.Option(help="Stop at this relative standard error, such as 0.02.")
     ] = None,
+    adaptive: Annotated[
+        str | None, typer.Option(help="'error': samples go where noise is. Or more of them at contrasts above 0 to 1.")
+    ] = None,
+    sampler: SAMPLER = None,
     seed: SEED = 0,
     width: WIDTH = None,
     height: HEIGHT = None,
     limit: LIMIT = None,
     threads: Annotated[int | None, typer.Option(help="Default: one for every core.")] = None,
+    denoise: Annotated[bool, typer.Option("--denoise", help="Remove noise; needs sightray[denoise].")] = False,
+    checkpoint: Annotated[Path | None, typer.Option(help="File to go on from if the render is killed.")] = None,
+    checkpoint_every: Annotated[float, typer.Option(help="Seconds between its states.")] = 60.0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint if there is one.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Make a picture of a scene."""
     import sightray as sr
-    from sightray.cli.progress import showing_progress
+    from sightray.cli.progress import showing_progress, told
     from sightray.images import check_writable
 
     path = output or Path(f"{Path(scene).stem}.png")
@@ -46,13 +72,18 @@ def render(
     loaded = resized(sr.load(scene, **limits(limit)), width, height)
     with showing_progress(quiet) as progress:
         image = sr.render(
-            loaded, named_integrator(integrator), samples=samples, adaptive=adaptive, seed=seed, threads=threads,
+            loaded, named_integrator(integrator), samples=samples, time=time, target_error=target_error,
+            adaptive=contrast_or_error(adaptive), sampler=named_sampler(sampler), seed=seed, threads=threads,
+            denoise=denoise, checkpoint=checkpoint, checkpoint_every=checkpoint_every, resume=resume,
             progress=progress, partial_ok=True,
         )  # fmt: skip
     image.save(path)
     info = image.info
-    rate = info["rays"] / max(info["seconds"], 1e-9) / 1e6
-    print(f"{path}: {image.width}x{image.height}, {info['seconds']:.2f} s, {rate:.1f} Mrays/s")
+    print(f"{path}: {image.width}x{image.height}, {told(info)}")
+    if info["invalid_samples"]:
+        share = info["invalid_samples"] / max(1, info["invalid_samples"] + info["sample_count"].sum())
+        print(f"sightray: warning: {info['invalid_samples']} samples were no finite numbers ({100 * share:.2g} %) and "
+              "were left out", file=sys.stderr)  # fmt: skip
     if not info["complete"]:
         print("sightray: interrupted; saved what there is", file=sys.stderr)
         raise typer.Exit(130)

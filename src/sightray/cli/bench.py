@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -14,7 +15,7 @@ bench: typer.Typer = typer.Typer(name="bench", no_args_is_help=True, rich_markup
 
 @bench.callback()
 def measurements() -> None:
-    """Measure: rays each second, and structures over a scene."""
+    """Measure: rays and paths each second, and structures over a scene."""
 
 
 @bench.command()
@@ -26,6 +27,19 @@ def rays(
     from sightray.cli import bench_rays
 
     bench_rays.rays(peers, as_json)
+
+
+@bench.command()
+def render(
+    peers: Annotated[bool, typer.Option(help="Also Mitsuba 3, if it is installed.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder to save all pictures in.")] = None,
+    only: Annotated[str | None, typer.Option(help="Names of scenes with commas between; by default all four.")] = None,
+) -> None:
+    """Path tracing: paths each second, error, and time to equal error, on four scenes. Takes minutes."""
+    from sightray.cli import bench_render
+
+    bench_render.render(peers, as_json, output, only)
 
 
 @bench.command()

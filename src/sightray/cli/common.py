@@ -8,6 +8,9 @@ import typer
 
 SCENE = Annotated[str, typer.Argument(help="A built-in scene's name, or a file: .yaml .test .nff .obj .ply .stl .glb")]
 INTEGRATOR = Annotated[str | None, typer.Option(help="How light is computed: whitted, path, simplepath.")]
+SAMPLER = Annotated[
+    str | None, typer.Option(help="Where samples fall: sobol, halton, stratified, blue-noise, independent.")
+]
 SEED = Annotated[int, typer.Option(help="The same seed gives the same picture.")]
 WIDTH = Annotated[int | None, typer.Option(help="Pixels; the height follows unless given.")]
 HEIGHT = Annotated[int | None, typer.Option(help="Pixels; the width follows unless given.")]
@@ -43,11 +46,29 @@ def resized(scene: Any, width: int | None, height: int | None) -> Any:
 
 def named_integrator(name: str | None) -> Any:
     """The integrator of that class or module name, in any case, with its default options: ``path`` is `PathTracer`."""
+    return _named("integrators", name)
+
+
+def named_sampler(name: str | None) -> Any:
+    """The sampler of that name, in any case: ``blue-noise`` is `BlueNoiseSampler`."""
+    return _named("samplers", name)
+
+
+def _named(family: str, name: str | None) -> Any:
+    """A member with its default options, by the name of its class or module, in any case, with any dashes."""
     if name is None:
         return None
     from sightray.registry import find, members
 
     spelled = {}
-    for known, cls in members("integrators").items():
-        spelled[known.lower()] = spelled[cls.__module__.rsplit(".", 1)[-1]] = known
-    return find("integrators", spelled.get(name.lower().replace("_", ""), name))()
+    for known, cls in members(family).items():
+        spelled[known.lower()] = spelled[cls.__module__.rsplit(".", 1)[-1].replace("_", "")] = known
+    return find(family, spelled.get(name.lower().replace("_", "").replace("-", ""), name))()
+
+
+def contrast_or_error(given: str | None) -> float | str | None:
+    """What ``--adaptive`` means: a number, or the word that `sightray.render` checks."""
+    try:
+        return None if given is None else float(given)
+    except ValueError:
+        return given

@@ -40,7 +40,7 @@ def _texture(value: Any, mi: Any) -> dict[str, Any]:
         return _rgb(value)
     if type(value).__name__ != "Bitmap":
         raise UnsupportedError(f"{type(value).__name__} is not translated for Mitsuba; allowed: colours and Bitmap")
-    return {"type": "bitmap", "bitmap": mi.Bitmap(np.ascontiguousarray(value.pixels)), "raw": True}
+    return {"type": "bitmap", "bitmap": mi.Bitmap(np.array(value.pixels, order="C")), "raw": True}
 
 
 def _bsdf(material: Any, mi: Any) -> dict[str, Any]:
@@ -101,4 +101,8 @@ def _light(light: Any, mi: Any) -> dict[str, Any]:
         place[:3] = np.column_stack([u, v, n / np.linalg.norm(n), np.asarray(light.corner) + u + v])
         emitter = {"type": "area", "radiance": _rgb(light.radiance)}
         return {"type": "rectangle", "to_world": _place(place, mi), "emitter": emitter}
-    raise UnsupportedError(f"{kind} is not translated for Mitsuba; allowed: RectangleLight")
+    if kind == "EnvironmentLight":
+        pixels = np.array(light.pixels * np.float32(light.radiance), order="C")
+        turn = np.diag([-1.0, 1.0, -1.0, 1.0])  # its first column looks where our middle one does
+        return {"type": "envmap", "bitmap": mi.Bitmap(pixels), "to_world": _place(light.transform.matrix @ turn, mi)}
+    raise UnsupportedError(f"{kind} is not translated for Mitsuba; allowed: RectangleLight, EnvironmentLight")

@@ -33,6 +33,15 @@ def describe(progress: Progress) -> str:
     return f"{100 * progress.fraction:.0f} %, {progress.rays_per_second / 1e6:.1f} Mrays/s{left}"
 
 
+def told(info: dict[str, Any]) -> str:
+    """How a render went: time, rate, and if it was not the number of samples that ended it, what there was then."""
+    rate = info["rays"] / max(info["seconds"], 1e-9) / 1e6
+    words = f"{info['seconds']:.2f} s, {rate:.1f} Mrays/s"
+    if info["stopped"] != "samples":
+        words += f", {info['samples']:.1f} samples per pixel, relative error {info['error']:.3g}"
+    return words
+
+
 def _duration(seconds: float) -> str:
     if seconds == float("inf"):
         return "?"

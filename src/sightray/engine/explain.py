@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sightray.cameras.base import sight_ray
-from sightray.engine.pixels import render_tile
+from sightray.engine.pixels import look, render_tile
 from sightray.errors import SceneError
 from sightray.images.transfer import encode_bytes
-from sightray.integrators.base import radiance
 from sightray.integrators.notes import (
     ABSORPTION,
     AMBIENT,
@@ -65,7 +64,7 @@ def explain_pixel(compiled: Compiled, integrator: Any, column: int, row: int, se
     ray = sight_ray(table_at(compiled.world, CAMERA), column + 0.5, row + 0.5, 0.5, 0.5, 0.5)
     draws = nested(begin(sampler_row, column, row, seed, 0, 1), 0)
     with recording() as notes:
-        found = radiance(integrator_row, compiled.world, ray, draws)
+        found = look(integrator_row, compiled.world, ray, draws)
     color = (found.color.x, found.color.y, found.color.z)
     lines = [f"pixel ({column}, {row}) of {camera.width}x{camera.height}: the ray through its centre"]
     lines += _Tree(compiled, notes).lines()

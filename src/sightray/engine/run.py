@@ -1,37 +1,37 @@
-"""Run an integrator over a picture: tiles on all cores, progress, interruption, adaptive passes."""
+"""Run an integrator over a picture: passes of tiles on all cores, until a limit is reached or somebody interrupts."""
 
 from __future__ import annotations
 
+import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from sightray import _jit
+from sightray.engine.adaptive import relative_error
+from sightray.engine.checkpoint import Checkpoint, State
 from sightray.engine.pixels import render_tile
 from sightray.engine.progress import Callback, Progress
+from sightray.engine.schedule import MOST, Schedule, Uniform, filled
 from sightray.film.film import Film
 from sightray.filters.table import filter_table
-from sightray.mathlib.table import NULL, Space, Table, aligned
+from sightray.images import Image
+from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
 POLL = 0.1  # seconds between progress reports and looks at the keyboard
 
 
-class Pass(NamedTuple):
-    """One sweep over the picture: samples first ... first + samples, or as many as `plan` says for each pixel."""
+class Limits(NamedTuple):
+    """What ends a render beside its schedule."""
 
-    first: int
-    samples: int
-    plan: np.ndarray | None  # (height, width) int32
-
-    def total(self, pixels: int) -> int:
-        return self.samples * pixels if self.plan is None else int(self.plan.sum())
+    time: float | None = None  # seconds of rendering
+    error: float | None = None  # relative standard error, see `engine.adaptive.relative_error`
 
 
 class Outcome(NamedTuple):
@@ -40,18 +40,33 @@ class Outcome(NamedTuple):
     film: Film
     rays: int
     seconds: float
-    complete: bool
+    stopped: str  # why: "samples", "time", "target_error" or "interrupted"
+
+    @property
+    def complete(self) -> bool:
+        """Whether nobody interrupted."""
+        return self.stopped != "interrupted"
+
+    def facts(self) -> dict[str, Any]:
+        """What there is to say of it, as in `Image.info`."""
+        counts = self.film.counts()
+        return {
+            "samples": float(counts.mean()), "rays": self.rays, "seconds": self.seconds, "stopped": self.stopped,
+            "complete": self.complete, "sample_count": counts, "standard_error": self.film.standard_error(),
+            "error": relative_error(self.film), "invalid_samples": self.film.invalid(),
+        }  # fmt: skip
 
 
 def run(
-    compiled: Compiled, integrator: Any, sampler: Any, filter: Any, *, samples: int, seed: int,
-    threads: int | None = None, progress: Callback | None = None,
-    refine: Callable[[Film], np.ndarray | None] | None = None,
+    compiled: Compiled, integrator: Any, sampler: Any, filter: Any, *, samples: int = 0, seed: int = 0,
+    schedule: Schedule | None = None, limits: Limits | None = None, threads: int | None = None,
+    progress: Callback | None = None, checkpoint: Checkpoint | None = None,
 ) -> Outcome:  # fmt: skip
     """Render a compiled scene.
 
-    `refine` is asked after the first pass for the number of additional samples of each pixel, (height, width) int32.
-    A `KeyboardInterrupt` ends the run within a tile's pixel; the outcome then holds what there is.
+    `schedule` decides where samples are taken, by default `samples` in each pixel; `samples` is what samplers are told
+    to expect, or 0 where that is not known. The first sweep over the picture is always finished, whatever the limits.
+    A `KeyboardInterrupt` ends the run within a sample; the outcome then holds what there is.
     """
     camera = require_camera(compiled.scene)
     compiled.tables.row_of(integrator)
@@ -63,16 +78,18 @@ def run(
             progress(Progress("compile", done, total, time.perf_counter() - began, 0, name))
 
     compiled.tables.prepare(render_tile, compiling)
-    job = _Job(compiled, integrator, sampler, Film(camera.width, camera.height), filter, seed, threads, progress)
+    film = Film(camera.width, camera.height)
+    job = _Job(
+        compiled, integrator, sampler, filter, film, samples, seed, limits or Limits(), threads, progress, checkpoint
+    )
     try:
-        job.sweep(Pass(0, samples, None))
-        plan = None if refine is None else refine(job.film)
-        if plan is not None and plan.any():
-            job.sweep(Pass(samples, 0, plan))
-        complete = True
+        stopped = job.passes(schedule or Uniform(samples))
+        job.report(at_the_end=True)
     except KeyboardInterrupt:
-        complete = False
-    return Outcome(job.film, job.rays, time.perf_counter() - job.began, complete)
+        stopped = "interrupted"
+    finally:
+        job.keep()
+    return Outcome(film, job.rays, job.seconds(), stopped)
 
 
 def thread_count(threads: int | None) -> int:
@@ -87,55 +104,146 @@ def thread_count(threads: int | None) -> int:
 class _Job:
     """State of a run that its threads share."""
 
-    def __init__(self, compiled: Compiled, integrator: Any, sampler: Any, film: Film, filter: Any,
-                 seed: int, threads: int | None, progress: Callback | None):  # fmt: skip
-        self.film, self.seed, self.progress = film, seed, progress
-        self.world, self.integrator = compiled.world, compiled.tables.row_of(integrator)
-        self.sampler = compiled.tables.row_of(sampler)
+    def __init__(self, compiled: Compiled, integrator: Any, sampler: Any, filter: Any, film: Film, expected: int,
+                 seed: int, limits: Limits, threads: int | None, progress: Callback | None,
+                 checkpoint: Checkpoint | None):  # fmt: skip
+        self.film, self.limits, self.progress, self.checkpoint = film, limits, progress, checkpoint
+        self.transfer = compiled.scene.transfer
         self.space = Space()
-        self.filter, self.stop = filter_table(filter, self.space), self.space.array(aligned(8, np.int64))
+        self.stop = self.space.array(aligned(8, np.int64))
+        rows = compiled.world, compiled.tables.row_of(integrator), compiled.tables.row_of(sampler)
+        self.rows = (*rows, film.table, filter_table(filter, self.space))
+        self.options = expected, int(expected == 1), seed
         self.threads = thread_count(threads)
         self.kernel = _jit.native(render_tile)
+        self.target: np.ndarray | None = None
         self.rays = self.done = self.total = 0
+        self.earlier = 0.0  # seconds that went into the checkpoint
+        if checkpoint is not None and (state := checkpoint.load()) is not None:
+            film.pixels[...], film.marked[...], self.target, self.rays, self.earlier = state
+            self.done = int(film.taken().sum())
         self.began = time.perf_counter()
+        self.saved = self.began
 
-    def sweep(self, this: Pass) -> None:
-        """Take the samples of one pass."""
-        self.total += this.total(self.film.width * self.film.height)
-        plan = NULL if this.plan is None else Table(np.ascontiguousarray(this.plan, np.int32))
-        queue = self._tiles()
-        with ThreadPoolExecutor(self.threads) as pool:
-            try:
-                running = {pool.submit(self._tile, this, plan, tile) for tile in islice(queue, 2 * self.threads)}
-                while running:
-                    finished, running = wait(running, POLL, FIRST_COMPLETED)
-                    for future in finished:
-                        self._account(future)
-                        running |= {pool.submit(self._tile, this, plan, tile) for tile in [next(queue, None)] if tile}
-                    self._report()
-            except BaseException:
-                self.stop.view(np.int64)[0] = 1
-                raise
+    def seconds(self) -> float:
+        """Seconds of rendering, those before a checkpoint included."""
+        return self.earlier + time.perf_counter() - self.began
+
+    def passes(self, schedule: Schedule) -> str:
+        """Sweep over the picture until something says stop: what."""
+        target = schedule.next(self.film, None) if self.target is None else self.target
+        error = math.inf
+        while target is not None:
+            self.target = target
+            self.total = self._expect(schedule, target, error)
+            until = math.inf if self.limits.time is None or target.max() <= 1 else self.limits.time
+            if not self.sweep(target, until):
+                return "time"
+            if self.limits.error is not None:
+                error = relative_error(self.film)
+                if error <= self.limits.error:
+                    return "target_error"
+            if self.limits.time is not None and self.seconds() >= self.limits.time and target.min() > 0:
+                return "time"
+            target = schedule.next(self.film, target)
+            if target is not None:
+                self.film.mark()
+        return "samples"
+
+    def _expect(self, schedule: Schedule, target: np.ndarray, error: float) -> int:
+        """How many pixel samples there will be, as far as the schedule and the error so far tell."""
+        total = int(target.sum(dtype=np.int64))
+        if schedule.samples < MOST:
+            total = max(total, schedule.samples * target.size)
+        if self.limits.error is not None and math.isfinite(error):
+            needed = int(self.done * (error / self.limits.error) ** 2)
+            total = needed if schedule.samples == MOST else min(total, needed)
+        return total
+
+    def sweep(self, target: np.ndarray, until: float) -> bool:
+        """Take samples until all pixels have as many as `target` says; False if the time `until` came first."""
+        table = Table(np.ascontiguousarray(target, np.int32))
+        while True:
+            self.stop.view(np.int64)[0] = 0
+            queue = self._tiles()
+            running: set[Future] = set()
+            with ThreadPoolExecutor(self.threads) as pool:
+                try:
+                    due = self._run(pool, queue, running, table, until)
+                finally:
+                    self._drain(running)
+            if not due:
+                return True
+            if self.seconds() >= until:
+                return False
+            self.keep()
+
+    def _run(self, pool: ThreadPoolExecutor, queue: Iterator, running: set[Future], table: Table, until: float) -> bool:
+        """Keep all threads at work on tiles; True if there is something else to do before the last is finished."""
+        for tile in queue:
+            running.add(pool.submit(self._tile, table, tile))
+            while len(running) >= 2 * self.threads:
+                self._wait(running, until)
+                if self._is_due(until):
+                    return True
+        while running:
+            self._wait(running, until)
+            if running and self._is_due(until):
+                return True
+        return False
+
+    def _is_due(self, until: float) -> bool:
+        """Whether time is up, or a checkpoint is to be written."""
+        if self.seconds() >= until:
+            return True
+        return self.checkpoint is not None and time.perf_counter() - self.saved >= self.checkpoint.every
+
+    def _wait(self, running: set[Future], until: float) -> None:
+        """Wait for a tile, but not for long; tell how far things are."""
+        finished, _ = wait(running, max(0.0, min(POLL, until - self.seconds())), FIRST_COMPLETED)
+        self._account(finished, running)
+        self.report()
+
+    def report(self, at_the_end: bool = False) -> None:
+        """Tell how far things are."""
+        if self.progress is None:
+            return
+        seconds, total = self.seconds(), max(self.done, self.total)
+        if self.limits.time is not None:  # which comes first?
+            by_then = int(self.done * max(1.0, self.limits.time / max(seconds, 1e-9)))
+            total = by_then if self.total == 0 else min(total, by_then)
+        self.progress(Progress("render", self.done, self.done if at_the_end else total, seconds, self.rays,
+                               picture=self._picture))  # fmt: skip
+
+    def _drain(self, running: set[Future]) -> None:
+        """End all tiles that run, each after its present sample, so that the film is at rest."""
+        if running:
+            self.stop.view(np.int64)[0] = 1
+            self._account(wait(running).done, running)
+
+    def _account(self, finished: set[Future], running: set[Future]) -> None:
+        for future in finished:
+            running.discard(future)
+            taken, rays = future.result()
+            self.done += taken
+            self.rays += rays
 
     def _tiles(self) -> Iterator[tuple[int, int, int, int]]:
         for y in range(0, self.film.height, TILE):
             for x in range(0, self.film.width, TILE):
                 yield x, y, min(x + TILE, self.film.width), min(y + TILE, self.film.height)
 
-    def _tile(self, this: Pass, plan: Table, tile: tuple[int, int, int, int]) -> tuple[int, int]:
-        x0, y0, x1, y1 = tile
-        taken = (x1 - x0) * (y1 - y0) * this.samples if this.plan is None else int(this.plan[y0:y1, x0:x1].sum())
-        rays = self.kernel(
-            self.world, self.integrator, self.sampler, self.film.table, self.filter, plan, self.stop,
-            x0, y0, x1, y1, self.film.width, this.first, this.samples, self.seed,
-        )  # fmt: skip
-        return taken, rays
+    def _tile(self, table: Table, tile: tuple[int, int, int, int]) -> tuple[int, int]:
+        before = self.film.taken_in(*tile)
+        rays = self.kernel(*self.rows, table, self.stop, *tile, self.film.width, *self.options)
+        return self.film.taken_in(*tile) - before, rays
 
-    def _account(self, future: Future) -> None:
-        taken, rays = future.result()
-        self.done += taken
-        self.rays += rays
+    def _picture(self) -> Image:
+        seen = self.film.taken()  # before the image: what comes in between counts as not there yet
+        return Image(filled(self.film.image(), seen), transfer=self.transfer)
 
-    def _report(self) -> None:
-        if self.progress is not None:
-            self.progress(Progress("render", self.done, self.total, time.perf_counter() - self.began, self.rays))
+    def keep(self) -> None:
+        """Write the checkpoint, if one is wanted."""
+        if self.checkpoint is not None and self.target is not None:
+            self.checkpoint.save(State(self.film.pixels, self.film.marked, self.target, self.rays, self.seconds()))
+            self.saved = time.perf_counter()

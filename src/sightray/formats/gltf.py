@@ -4,15 +4,13 @@ Read here rather than by trimesh, which leaves sparse accessors at zero, does no
 triangle fans, second texture coordinates and texture transforms, drops what hangs below a camera
 without a word, and takes memory for as many elements as an accessor claims.
 
-A texture's v runs downwards in glTF and is turned here. Materials become `Lambert` of the base colour; those that
-transmit (KHR_materials_transmission) `Glass`, and smooth metals `Mirror`. Vertex colours, skins, morph targets,
-animations, lights and cameras are ignored.
+A texture's v runs downwards in glTF and is turned here. Materials become `Principled`; see gltf_materials.py. Vertex
+colours, skins, morph targets, animations, lights and cameras are ignored.
 """
 
 from __future__ import annotations
 
 import math
-import tempfile
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -20,20 +18,15 @@ from typing import Any
 import numpy as np
 
 from sightray.errors import FormatError, UnsupportedError
-from sightray.formats.base import TEXTURES, Format, Limits
+from sightray.formats.base import Format, Limits
 from sightray.formats.framing import frame_mesh
 from sightray.formats.gltf_buffers import Buffers
+from sightray.formats.gltf_materials import Materials
 from sightray.formats.solid import solid_mesh
-from sightray.images import load_image
-from sightray.materials.glass import Glass
-from sightray.materials.lambert import Lambert
-from sightray.materials.mirror import Mirror
 from sightray.mathlib.transform import Transform
 from sightray.scene.instance import Instance
 from sightray.scene.scene import Scene
-from sightray.textures.bitmap import Bitmap
 
-WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 IGNORABLE = ("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights", "KHR_animation")
 
@@ -44,8 +37,7 @@ class Reader:
     def __init__(self, path: Path, limits: Limits):
         self.path, self.limits = path, limits
         self.file = Buffers(path, limits)
-        self.images: dict[int, Any] = {}
-        self.materials: dict[int, Any] = {}
+        self.materials = Materials(self.file)
         self.primitives: dict[int, list[Any]] = {}
         self.triangles = 0
 
@@ -96,8 +88,8 @@ class Reader:
     def local(self, node: Any) -> np.ndarray:
         """A node's matrix: given, or translation after rotation after scale."""
         if "matrix" in node:
-            return self.floats(node, "matrix", 16).reshape(4, 4).T
-        x, y, z, w = self.floats(node, "rotation", 4, (0, 0, 0, 1))
+            return self.file.floats(node, "matrix", 16).reshape(4, 4).T
+        x, y, z, w = self.file.floats(node, "rotation", 4, (0, 0, 0, 1))
         size = math.sqrt(x * x + y * y + z * z + w * w)
         if not 0 < size < math.inf:
             raise FormatError("rotation [0, 0, 0, 0]; allowed: a unit quaternion", self.path)
@@ -107,16 +99,9 @@ class Reader:
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]) * self.floats(node, "scale", 3, (1, 1, 1))  # fmt: skip
-        matrix[:3, 3] = self.floats(node, "translation", 3, (0, 0, 0))
+        ]) * self.file.floats(node, "scale", 3, (1, 1, 1))  # fmt: skip
+        matrix[:3, 3] = self.file.floats(node, "translation", 3, (0, 0, 0))
         return matrix
-
-    def floats(self, owner: Any, key: str, count: int, default: Any = None) -> np.ndarray:
-        given = owner.get(key, default) if isinstance(owner, dict) else default
-        values = np.asarray(given) if isinstance(given, list | tuple) else np.zeros(0)
-        if values.shape != (count,) or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-            raise FormatError(f"'{key}': got {str(given)[:60]}; expected {count} finite numbers", self.path)
-        return values.astype(np.float64)
 
     def mesh(self, index: Any) -> list[Any]:
         owner = self.file.item("meshes", index)
@@ -143,7 +128,7 @@ class Reader:
             return None
         self.triangles += len(faces)
         self.limits.check_triangles(self.triangles, self.path)
-        material, texture = self.material(owner["material"]) if "material" in owner else (None, {})
+        material, texture = self.materials.material(owner["material"]) if "material" in owner else (None, {})
         channel = f"TEXCOORD_{texture.get('texCoord', 0)}"
         uvs = self.uvs(attributes[channel], texture, len(vertices)) if channel in attributes else None
         normals = self.columns(attributes["NORMAL"], 3, len(vertices)) if "NORMAL" in attributes else None
@@ -164,65 +149,9 @@ class Reader:
             # Counter-clockwise as seen with v downwards, which is clockwise by the signs; see KhronosGroup/glTF#1563.
             angle = float(self.file.get(moved, "rotation", (int, float), 0.0))
             c, s = math.cos(angle), math.sin(angle)
-            uv = uv * self.floats(moved, "scale", 2, (1, 1)) @ np.array([[c, -s], [s, c]])
-            uv = uv + self.floats(moved, "offset", 2, (0, 0))
+            uv = uv * self.file.floats(moved, "scale", 2, (1, 1)) @ np.array([[c, -s], [s, c]])
+            uv = uv + self.file.floats(moved, "offset", 2, (0, 0))
         return np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1)
-
-    def material(self, index: Any) -> tuple[Any, dict[str, Any]]:
-        """The material, and its texture's entry."""
-        owner = self.file.item("materials", index)
-        if index not in self.materials:
-            self.materials[index] = self.make_material(owner)
-        return self.materials[index]
-
-    def make_material(self, owner: Any) -> tuple[Any, dict[str, Any]]:
-        get, number = self.file.get, (int, float)
-        pbr, extensions = get(owner, "pbrMetallicRoughness", dict, {}), get(owner, "extensions", dict, {})
-        color = np.clip(self.floats(pbr, "baseColorFactor", 4, (1, 1, 1, 1))[:3], 0, 1)
-        strength = get(get(extensions, "KHR_materials_emissive_strength", dict, {}), "emissiveStrength", number, 1.0)
-        emission = np.maximum(self.floats(owner, "emissiveFactor", 3, (0, 0, 0)) * max(0.0, strength), 0)
-        if get(get(extensions, "KHR_materials_transmission", dict, {}), "transmissionFactor", number, 0.0) > 0.5:
-            ior = get(get(extensions, "KHR_materials_ior", dict, {}), "ior", number, 1.5)
-            return Glass(ior=ior if ior > 0 else 1.5, tint=color), {}
-        texture = get(pbr, "baseColorTexture", dict, {})
-        albedo = self.texture(texture, color) if texture else color
-        # Metal is the default, so it means a mirror only where it is stated, and together with a smooth surface.
-        if pbr.get("metallicFactor") == 1 and get(pbr, "roughnessFactor", number, 1.0) < 0.1:
-            return Mirror(reflectance=albedo), texture
-        return Lambert(albedo=albedo, emission=emission), texture
-
-    def texture(self, info: Any, factor: np.ndarray) -> Any:
-        """A picture times a factor, as its sampler wants it."""
-        owner = self.file.item("textures", info.get("index"))
-        if "source" not in owner:
-            raise UnsupportedError(f"{self.path}: a texture of another kind than PNG or JPEG")
-        picture = self.image(owner["source"])
-        if (factor != 1).any():
-            pixels = load_image(picture).pixels if isinstance(picture, Path) else picture
-            picture = np.broadcast_to(pixels[..., :3], (*pixels.shape[:2], 3)) * factor.astype(np.float32)
-        sampler = self.file.item("samplers", owner["sampler"]) if "sampler" in owner else {}
-        return Bitmap(image=picture, wrap=WRAPS.get(sampler.get("wrapS", 10497), "repeat"),
-                      filter="nearest" if sampler.get("magFilter") == 9728 else "bilinear")  # fmt: skip
-
-    def image(self, index: Any) -> Any:
-        """Path of a picture, or the pixels of an embedded one."""
-        owner = self.file.item("images", index)
-        if index not in self.images:
-            found: Any = None
-            if "bufferView" in owner:
-                found = bytes(self.file.view(owner["bufferView"])[0])
-            elif "uri" in owner:
-                found = self.file.uri(self.file.get(owner, "uri", str), TEXTURES)
-            if isinstance(found, bytes):
-                # The codec goes by the first bytes, so ".png" does for JPEG too.
-                with tempfile.TemporaryDirectory() as folder:
-                    file = Path(folder) / "embedded.png"
-                    file.write_bytes(found)
-                    found = load_image(file).pixels
-            if isinstance(found, Path) and not found.exists():
-                raise FormatError(f"images: {found} is missing; expected a PNG or JPEG file there", self.path)
-            self.images[index] = found
-        return self.images[index]
 
 
 def _corners(mode: int, count: int) -> np.ndarray:

@@ -59,6 +59,14 @@ class Buffers:
             raise FormatError(f"'{key}': got {str(value)[:60]}; expected {wanted}", self.path)
         return value
 
+    def floats(self, owner: Any, key: str, count: int, default: Any = None) -> np.ndarray:
+        """A row of `count` finite numbers."""
+        given = owner.get(key, default) if isinstance(owner, dict) else default
+        values = np.asarray(given) if isinstance(given, list | tuple) else np.zeros(0)
+        if values.shape != (count,) or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+            raise FormatError(f"'{key}': got {str(given)[:60]}; expected {count} finite numbers", self.path)
+        return values.astype(np.float64)
+
     def item(self, key: str, index: Any) -> dict[str, Any]:
         """An object out of one of the file's lists."""
         items = self.get(self.json, key, list, [])

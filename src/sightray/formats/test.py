@@ -29,15 +29,12 @@ from typing import Any
 import numpy as np
 
 from sightray.cameras.perspective import PerspectiveCamera
-from sightray.errors import FormatError, UnsupportedError, unknown
+from sightray.errors import FormatError, unknown
 from sightray.formats.base import Format, Limits, number, read_text, reading, whole
 from sightray.formats.solid import solid_mesh
-from sightray.formats.test_continuation import AMOUNTS, CHOICES, check_continuation
-from sightray.integrators.whitted import MAX_DEPTH, Whitted
+from sightray.formats.test_continuation import AMOUNTS, CHOICES, Settings
 from sightray.lights.directional import DirectionalLight
 from sightray.lights.point import PointLight
-from sightray.lights.rectangle import RectangleLight
-from sightray.materials.phong import Phong
 from sightray.mathlib.transform import Transform
 from sightray.scene.scene import Scene
 from sightray.shapes.sphere import Sphere
@@ -51,7 +48,8 @@ class Reader:
     def __init__(self, path: Path, limits: Limits):
         self.path, self.limits, self.line = path, limits, 0
         self.width, self.height, self.depth, self.samples, self.name = 640, 480, 5, 1, ""
-        self.camera_at = 0  # line of the camera
+        self.settings = Settings(path)
+        self.camera_at = self.depth_at = 0  # lines of the camera and of maxdepth
         self.camera: Any = None
         self.vertices: list[list[float]] = []
         self.shaded_vertices: list[list[float]] = []  # place and normal: a pile of its own
@@ -59,33 +57,39 @@ class Reader:
         self.attenuation = (1.0, 0.0, 0.0)
         self.colors: dict[str, Any] = {"ambient": (0.2,) * 3, "diffuse": BLACK, "specular": BLACK, "emission": BLACK,
                                        "shininess": 0.0}  # fmt: skip
-        self.materials: dict[tuple[Any, ...], Phong] = {}
+        self.materials: dict[tuple[Any, ...], Any] = {}
         self.objects: list[Any] = []
+        self.quads: list[tuple[int, int, list[float]]] = []  # line, place among the objects, numbers
         self.run: tuple[Any, ...] = ()  # material and kind of the triangles that wait
         self.triangles: list[np.ndarray] = []  # (3, 3) or, with normals, (3, 6) rows in the world
         self.total = 0
 
     def read(self) -> Scene:
-        for line, content in enumerate(read_text(self.path, self.limits).splitlines(), 1):
-            self.line = line
-            tokens = content.split("#", 1)[0].split()
+        lines = [content.split("#", 1)[0].split() for content in read_text(self.path, self.limits).splitlines()]
+        for self.line, tokens in enumerate(lines, 1):
+            if tokens[:1] == ["integrator"]:  # materials depend on it, wherever it stands
+                self.settings.command(tokens[0], tokens[1:], self.line)
+        for self.line, tokens in enumerate(lines, 1):
             if tokens:
                 with reading(self.path, self.line):
                     self.command(tokens[0], tokens[1:])
         self.flush()
+        for line, place, values in self.quads:
+            with reading(self.path, line):
+                self.objects[place] = self.settings.quad_light(values)
         if self.camera is None:
             raise FormatError("no camera; expected a line 'camera from(3) at(3) up(3) fovy'", self.path)
         with reading(self.path, self.camera_at):
             camera = PerspectiveCamera(eye=self.camera[:3], target=self.camera[3:6], up=self.camera[6:9],
                                        vfov=self.camera[9], width=self.width, height=self.height)  # fmt: skip
         return Scene(
-            *self.objects, camera=camera, ambient=1.0, samples=self.samples, transfer="floor", name=self.name,
-            integrator=Whitted(max_depth=self.depth, cutoff=0.0, two_sided=False),
+            *self.objects, camera=camera, ambient=1.0, samples=self.samples, name=self.name,
+            transfer=self.settings.transfer, integrator=self.settings.integrator(self.depth, self.depth_at),
         )  # fmt: skip
 
     def command(self, name: str, words: list[str]) -> None:
         if name in CHOICES or name in AMOUNTS:
-            return check_continuation(name, words, self.path, self.line)
+            return self.settings.command(name, words, self.line) if name != "integrator" else None
         if name == "output" and words:
             self.name = " ".join(words)
             return None
@@ -111,10 +115,7 @@ class Reader:
         self.width, self.height = (self.integer(name, value, 1) for value in values)
 
     def maxdepth(self, name: str, values: Any) -> None:
-        depth = self.integer(name, values[0], -1)
-        if not 0 <= depth <= MAX_DEPTH:
-            raise UnsupportedError(f"{self.path}:{self.line}: maxdepth {depth}; allowed: 0 to {MAX_DEPTH}")
-        self.depth = depth
+        self.depth, self.depth_at = self.integer(name, values[0], -1), self.line
 
     def spp(self, name: str, values: Any) -> None:
         self.samples = self.integer(name, values[0], 1)
@@ -157,7 +158,7 @@ class Reader:
                 corners[:, 3:] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         if not np.isfinite(corners).all():
             raise self.error(f"{name}: the transform moves it to infinity")
-        run = (name, *self.colors.values())
+        run = (name, *self.colors.values(), self.settings.surface)
         if run != self.run:
             self.flush()
             self.run = run
@@ -173,16 +174,16 @@ class Reader:
         mesh = solid_mesh(rows[:, :3], faces.reshape(-1, 3), normals, material=self.material(self.run[1:]))
         self.objects += [] if mesh is None else [mesh]
 
-    def material(self, values: tuple[Any, ...]) -> Phong:
+    def material(self, values: tuple[Any, ...]) -> Any:
         """One material for equal values, shared by all that have them."""
         if values not in self.materials:
-            named = dict(zip(self.colors, values, strict=True))
-            self.materials[values] = Phong(**named, mirror=named["specular"], highlight="blinn")
+            named = dict(zip(self.colors, values[:-1], strict=True))
+            self.materials[values] = self.settings.material(named, values[-1])
         return self.materials[values]
 
     def sphere(self, name: str, values: Any) -> None:
         self.objects.append(Sphere(center=values[:3], radius=values[3], transform=Transform(self.matrix),
-                                   material=self.material(tuple(self.colors.values()))))  # fmt: skip
+                                   material=self.material((*self.colors.values(), self.settings.surface))))  # fmt: skip
 
     def color(self, name: str, values: Any) -> None:
         if min(values) < 0:
@@ -202,9 +203,8 @@ class Reader:
         self.objects.append(DirectionalLight(direction=towards, irradiance=values[3:]))
 
     def quad_light(self, name: str, values: Any) -> None:
-        # It shines towards -(ab x ac), a `RectangleLight` towards edge_u x edge_v.
-        ab, ac = values[3:6], values[6:9]
-        self.objects.append(RectangleLight(corner=values[:3], edge_u=ac, edge_v=ab, radiance=values[9:]))
+        self.quads.append((self.line, len(self.objects), values))
+        self.objects.append(None)  # until it is known in how many cells the light is looked at
 
     def multiply(self, name: str, values: Any) -> None:
         """Right-multiply: the command that stands next to a primitive moves it first."""

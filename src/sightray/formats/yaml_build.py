@@ -14,13 +14,12 @@ from sightray.errors import FormatError, SceneError, did_you_mean, unknown
 from sightray.fields import REQUIRED, Child, Field, Other
 from sightray.formats.base import TEXTURES, Limits, asset, formats, reading
 from sightray.formats.yaml_nodes import Node
-from sightray.formats.yaml_transform import parse_transform
+from sightray.formats.yaml_transform import parse_motion, parse_transform
 from sightray.images import load_image
 from sightray.registry import Member, members
 from sightray.scene.instance import Group
 from sightray.scene.scene import Scene
 from sightray.shapes.mesh import Mesh
-from sightray.textures.bitmap import Bitmap
 
 # Sections of named members, and the families whose members stand in them.
 SECTIONS: dict[str, tuple[str, ...]] = {
@@ -139,7 +138,9 @@ class Builder:
         """What a field is to be made from: members in place of mappings and names, else plain numbers and strings."""
         if field.name == "transform":
             return parse_transform(node, self.path, where)
-        if issubclass(cls, Bitmap) and field.name == "image":
+        if field.name == "motion":
+            return parse_motion(node, self.path, where)
+        if field.name == "image":
             return self.image(node, where)
         if isinstance(field, Child):
             stated = isinstance(node.value, dict | str)

@@ -40,6 +40,23 @@ def parse_transform(node: Node, path: Path, where: str) -> Transform | None:
     return result
 
 
+def parse_motion(node: Node, path: Path, where: str) -> list[list[Any]] | None:
+    """Keyframes: a list of ``{time: seconds, transform: ...}``, or of pairs ``[seconds, ...]``."""
+    if node.value is None:
+        return None
+    if not isinstance(node.value, list):
+        raise FormatError(f"{where}: expected a list of keyframes 'time: seconds, transform: ...'", path, node.line)
+    keyframes = []
+    for k, part in enumerate(node.value):
+        found = part.value
+        if isinstance(found, dict) and set(found) == {"time", "transform"}:
+            found = [found["time"], found["transform"]]
+        if not isinstance(found, list) or len(found) != 2:
+            raise FormatError(f"{where}[{k}]: expected 'time: seconds, transform: ...'", path, part.line)
+        keyframes.append([found[0].plain(), parse_transform(found[1], path, f"{where}[{k}].transform")])
+    return keyframes
+
+
 def _step(name: str, argument: Any) -> Transform:
     if name == "translate":
         return Transform.translate(*_vector.convert(argument))

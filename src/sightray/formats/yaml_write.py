@@ -23,7 +23,6 @@ from sightray.images import Image, writing
 from sightray.registry import Member
 from sightray.scene.scene import Scene
 from sightray.shapes.mesh import Mesh
-from sightray.textures.bitmap import Bitmap
 
 INLINE = 64  # vertices, or values of a texture, that are written into the scene's own file
 PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./ -]*(?<! )")
@@ -84,11 +83,9 @@ class Writer:
             write_ply(self.path.parent / result["file"], member)
         for name, field in type(member).given.items():
             value = getattr(member, name)
-            if (beside and name in FROM_FILE) or is_default(field, value):
-                continue
-            if isinstance(member, Bitmap) and name == "image":
+            if name == "image" and value is not None:
                 result[name] = self.image(value)
-            else:
+            elif not (beside and name in FROM_FILE) and not is_default(field, value):
                 result[name] = self.plain(field.plain(value), f"{where}.{name}")
         return result
 

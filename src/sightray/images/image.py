@@ -25,9 +25,10 @@ class Image:
     pixels : (height, width, channels) float
         Linear values, unbounded; channels 1 (grey), 3 (RGB) or 4 (RGB and alpha, stored as given: nothing multiplies
         or divides by alpha). (height, width) is taken as one channel. Copied to float32.
-    transfer : {"srgb", "floor"}
+    transfer : {"srgb", "floor", "gamma2.2"}
         How values become bytes in `to_bytes`, PNG and JPEG. ``"srgb"``: the sRGB curve, rounded to nearest.
-        ``"floor"``: ``floor(255 * clamp(v, 0, 1))`` without a curve, the rule of course scenes. Alpha has no curve.
+        ``"floor"``: ``floor(255 * clamp(v, 0, 1))`` without a curve, the rule of course scenes. ``"gamma2.2"``: the
+        same of v to the power of 1/2.2. Alpha has no curve.
     info : dict
         Free-form facts about how the picture came to be, such as render statistics. Not saved.
 

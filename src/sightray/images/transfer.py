@@ -38,10 +38,15 @@ def _floor_bytes(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.floor(255.0 * x)
 
 
+def _gamma_bytes(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.floor(255.0 * np.power(x, 1 / 2.2))
+
+
 # name -> (rule for colour, rule for alpha); alpha is a coverage, so no curve ever bends it
 TRANSFERS: dict[str, tuple[Callable[..., NDArray[np.float64]], Callable[..., NDArray[np.float64]]]] = {
     "srgb": (_srgb_bytes, _round_bytes),
     "floor": (_floor_bytes, _floor_bytes),
+    "gamma2.2": (_gamma_bytes, _floor_bytes),
 }
 
 

@@ -8,7 +8,8 @@ from sightray._jit import kernel
 from sightray.accelerators.item import CLEAR, TRANSLUCENT
 from sightray.integrators.base import Radiance
 from sightray.integrators.nesting import Nest, crossing
-from sightray.integrators.shading import Frame, into
+from sightray.integrators.shading import Frame, first_step, into
+from sightray.integrators.terminator import shadow_ray
 from sightray.lights.base import cells, direction_density, illuminate, sky
 from sightray.materials.base import bsdf
 from sightray.mathlib.bands import as_light
@@ -47,7 +48,7 @@ def lit_normal(point: Point) -> Vec3:
 
 @kernel
 def direct_light(
-    world: Table, point: Point, frame: Frame, wo: Vec3, t_min: f64, nest: Nest, bands: Table, own: Draws
+    world: Table, point: Point, start: Vec3, frame: Frame, wo: Vec3, t_min: f64, nest: Nest, bands: Table, own: Draws
 ) -> Radiance:
     """Light that a surface reflects from one light, at one of its points, over the probability of that choice."""
     which, place = pair(own, LIGHT), pair(own, PLACE)
@@ -63,7 +64,8 @@ def direct_light(
     if max4(found) <= 0.0:
         return Radiance(grey(0.0), 0)
     behind = crossing(world, nest, point, sample.direction) if wo.z * wi.z < 0.0 else nest
-    left = unblocked(world, point.p, sample.direction, t_min, sample.distance - t_min, behind, bands, own)
+    ray = shadow_ray(point.p if wo.z * wi.z < 0.0 else start, point.p, sample.direction, sample.distance)
+    left = unblocked(world, ray.o, ray.d, t_min, ray.distance - t_min, behind, bands, own)
     if max4(left) <= 0.0:
         return Radiance(grey(0.0), 1)
     p = direction_density(light, point.p, sample.direction, sample.distance) * chosen.probability
@@ -84,7 +86,8 @@ def direct_light_within(world: Table, p: Vec3, d: Vec3, nest: Nest, bands: Table
     found = as_light(bands, sample.irradiance) * (density * parts / chosen.probability)
     if max4(found) <= 0.0:
         return Radiance(grey(0.0), 0)
-    left = unblocked(world, p, sample.direction, 0.0, sample.distance, nest, bands, own)
+    before = (sample.distance - first_step(math.nan, p, 0.0)) * (1.0 - 1e-9)  # the light's own surface is no obstacle
+    left = unblocked(world, p, sample.direction, 0.0, before, nest, bands, own)
     q = direction_density(light, p, sample.direction, sample.distance) * chosen.probability
     return Radiance(found * left * (power_heuristic(q, density) if q > 0.0 else 1.0), 1)
 

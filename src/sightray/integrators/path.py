@@ -20,13 +20,14 @@ from sightray.integrators.direct import (
     lit_normal,
 )
 from sightray.integrators.nesting import crossing, outside
-from sightray.integrators.shading import first_step, frame_of, into, out_of
+from sightray.integrators.shading import first_step, frame_of, into, on_true_side, out_of
 from sightray.integrators.spectral import choose_bands, seen_colour
+from sightray.integrators.terminator import lifted
 from sightray.materials.base import emitted, interior, sample_bsdf
 from sightray.mathlib.bands import BANDS_WORDS, as_light, ones
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table, scratch, table_at
-from sightray.mathlib.vec import Vec3, dot, grey, max4
+from sightray.mathlib.vec import Vec3, grey, max4
 from sightray.media.base import sample_distance, sample_phase, transmittance
 from sightray.samplers.base import Draws, nested, number, pair
 from sightray.scene.world import Beam, Point, find_closest, light_count, on_seen_side, point_of, sight_beam
@@ -63,7 +64,6 @@ DEPTH, ROULETTE_DEPTH, CLAMP, _, BAND_TABLE = PathTracer.offsets()
 
 # Dimensions of a bounce's draws, beside those of direct.py, and the number of the nested ones for a medium.
 WAVELENGTH, WAY, CHOICE, MEDIUM = 0, 0, 1, 0
-LONGEST_ODDS = 0.95  # of going on in Russian roulette
 MOST_EVENTS = 100_000  # a walk in a body that takes nothing away must end somewhere
 WIDEST = 0.2  # spread of a beam after a matte surface, about what a filter can still tell apart
 LOBE = 0.1  # share of a lobe's width that one sample of it stands for
@@ -99,7 +99,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
 
         # Go through what fills the way; in the midst of it light may scatter.
         if not is_null(nest.here):
-            went = sample_distance(nest.here, o, d, min(hit.t, FAR), bands, nested(own, MEDIUM))
+            went = sample_distance(nest.here, o, d, min(hit.t, FAR), beta, bands, nested(own, MEDIUM))
             beta = beta * went.weight
             if max4(beta) <= 0.0:
                 break
@@ -143,7 +143,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         frame = frame_of(point)
         wo = into(frame, -d)
         if light_count(world) > 0:
-            direct = direct_light(world, point, frame, wo, t_min, nest, bands, own)
+            direct = direct_light(world, point, lifted(world, hit, point), frame, wo, t_min, nest, bands, own)
             rays += direct.rays
             color += limited(integrator, beta * direct.color, depth + 1)
 
@@ -172,7 +172,7 @@ def survival(integrator: Table, beta: Vec3, event: i64) -> f64:
         return 0.0
     if event <= i64_at(integrator, ROULETTE_DEPTH):
         return 1.0
-    return min(max4(beta), LONGEST_ODDS)
+    return min(max4(beta), 1.0)
 
 
 @kernel
@@ -182,19 +182,6 @@ def darkened(point: Point, o: Vec3, d: Vec3, t: f64, bands: Table, own: Draws) -
     if is_null(inside):
         return grey(1.0)
     return transmittance(inside, o, d, t, bands, nested(own, MEDIUM))
-
-
-@kernel
-def on_true_side(point: Point, d: Vec3, way: Vec3, passes: bool) -> Vec3:
-    """A direction moved to the side of the true surface that it is meant for.
-
-    Where the shading normal differs from the true one, light that was reflected by the one may point into the other.
-    Mirrored in the true surface it stays outside: nothing leaks through, and no dark fringe is left.
-    """
-    facing = dot(point.normal, way)
-    if (facing * dot(point.normal, d) > 0.0) == passes:
-        return way
-    return way - point.normal * (2.0 * facing)
 
 
 @kernel

@@ -51,6 +51,19 @@ def out_of(frame: Frame, v: Vec3) -> Vec3:
 
 
 @kernel
+def on_true_side(point: Point, d: Vec3, way: Vec3, passes: bool) -> Vec3:
+    """A direction moved to the side of the true surface that it is meant for.
+
+    Where the shading normal differs from the true one, light that was reflected by the one may point into the other.
+    Mirrored in the true surface it stays outside: nothing leaks through, and no dark fringe is left.
+    """
+    facing = dot(point.normal, way)
+    if (facing * dot(point.normal, d) > 0.0) == passes:
+        return way
+    return way - point.normal * (2.0 * facing)
+
+
+@kernel
 def first_step(stated: f64, p: Vec3, t: f64) -> f64:
     """Where secondary rays begin, so that they do not meet the surface they leave; `stated` is NaN where it is not."""
     if stated == stated:

@@ -24,6 +24,7 @@ from sightray.integrators.notes import (
     note_term,
 )  # fmt: skip
 from sightray.integrators.shading import first_step
+from sightray.integrators.terminator import lifted, shadow_ray
 from sightray.lights.base import cells, illuminate
 from sightray.materials.base import BLINN, Local, local
 from sightray.mathlib.frame import reflect, refract
@@ -48,8 +49,8 @@ from sightray.scene.world import (
     background,
     find_closest,
     is_blocked,
+    lamp_count,
     light_at,
-    light_count,
     on_seen_side,
     point_of,
     sight_beam,
@@ -132,7 +133,8 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) ->
             left = vexp(terms.absorption * -hit.t)
             note_term(number, ABSORPTION, left)
             weight = weight * left
-        lit = illuminated(integrator, world, point, terms, d, t_min, number, draws)
+        start = lifted(world, hit, point) if i64_at(integrator, TWO_SIDED) != 0 else point.p
+        lit = illuminated(integrator, world, point, start, terms, d, t_min, number, draws)
         color += weight * lit.color
         rays += lit.rays
 
@@ -169,9 +171,10 @@ def push(
 
 @kernel
 def illuminated(
-    integrator: Table, world: Table, point: Point, terms: Local, d: Vec3, t_min: f64, ray: i64, draws: Draws
-) -> Radiance:
-    """Light that a surface sends towards the viewer by itself, from ambient light and from each light."""
+    integrator: Table, world: Table, point: Point, start: Vec3, terms: Local, d: Vec3, t_min: f64, ray: i64,
+    draws: Draws,
+) -> Radiance:  # fmt: skip
+    """Light that a surface sends towards the viewer by itself, from ambient light and, by rays from `start`, each light."""
     if i64_at(integrator, ILLUMINATION) == 0:
         note_term(ray, FLAT, terms.color + terms.emission)
         return Radiance(terms.color + terms.emission, 0)
@@ -185,7 +188,7 @@ def illuminated(
         n = -n
     own = nested(draws, ray)
     dimension = 0
-    for index in range(light_count(world)):
+    for index in range(lamp_count(world)):
         light = light_at(world, index)
         received = grey(0.0)
         seen = 0.0
@@ -199,7 +202,8 @@ def illuminated(
                 visible = grey(1.0)
                 if i64_at(integrator, SHADOWS) != 0:
                     rays += 1
-                    visible = transmitted(integrator, world, point.p, sample.direction, t_min, sample.distance)
+                    way = shadow_ray(start, point.p, sample.direction, sample.distance)
+                    visible = transmitted(integrator, world, way.o, way.d, t_min, way.distance)
                 received += answer * visible
                 seen += max3(visible)
         note_light(ray, index, seen / count, received)

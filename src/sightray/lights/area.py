@@ -38,7 +38,12 @@ def square_of_cells(light: Table) -> i64:
 @kernel
 def place_in_grid(light: Table, cell: i64, u: f64, v: f64) -> Vec3:
     """The point (u, v) of a cell, as x and y in the unit square that the grid divides."""
-    n = i64_at(light, GRID)
+    return place_in_cells(i64_at(light, GRID), cell, u, v)
+
+
+@kernel
+def place_in_cells(n: i64, cell: i64, u: f64, v: f64) -> Vec3:
+    """The point (u, v) of one of n x n cells, as x and y in the unit square."""
     return Vec3((cell % n + u) / n, (cell // n + v) / n, 0.0, 0.0)
 
 

@@ -7,7 +7,10 @@ an area are cut into `cells`, one shadow ray each, so that shadows grow soft (R.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from sightray._jit import implements, method
 from sightray.mathlib.scalars import f64, i64
@@ -24,8 +27,26 @@ class LightSample(NamedTuple):
     irradiance: Vec3  # on a surface that faces the light
 
 
+class LightBounds(NamedTuple):
+    """Where a light stands, and where its light goes at most: what lights are chosen by when there are many.
+
+    For n lights at once, all have one more dimension in front.
+    """
+
+    lower: np.ndarray  # (3,) box around it, metres, world
+    upper: np.ndarray
+    axis: np.ndarray  # (3,) unit: the middle of the cone of its normals
+    normals: Any  # half-angle of that cone, radians; pi for what shines all around
+    spread: float  # angle from the nearest normal beyond which there is no light, radians
+    intensity: Any  # radiant intensity along a normal, mean of red, green and blue, W/sr
+
+
 class Light(Member, family="lights"):
     """Base of all lights."""
+
+    def bounds(self) -> LightBounds | None:
+        """Where it stands and shines; None for lights without a place, and where nothing is known."""
+        return None
 
     @property
     def infinite(self) -> bool:
@@ -35,6 +56,30 @@ class Light(Member, family="lights"):
     def shape(self) -> Any | None:
         """The emitting surface as a shape, for lights that can be seen; else None."""
         return None
+
+
+class LightPolygon(NamedTuple):
+    """A flat light with three or four corners, as a point sees it that is on the side which shines."""
+
+    corners: i64  # 3: a, a + u, a + v. 4: a, a + u, a + u + v, a + v. 0 for all other lights
+    a: Vec3
+    u: Vec3
+    v: Vec3
+    radiance: Vec3  # RGB; 0 from behind
+
+
+def around(center: Any, radius: float, intensity: Any) -> LightBounds:
+    """Bounds of a light that shines to all sides from a ball around a point; `intensity` is a colour."""
+    c = np.array(center, np.float64)
+    up = np.array([0.0, 1.0, 0.0])
+    return LightBounds(c - radius, c + radius, up, math.pi, 0.5 * math.pi, float(np.mean(intensity)))
+
+
+def flat(corners: Any, normal: Any, two_sided: bool, radiant: Any) -> LightBounds:
+    """Bounds of a flat light within the box of `corners`, (n, 3); `radiant` is its radiance, a colour, times its area."""
+    half = math.pi if two_sided else 0.0
+    lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
+    return LightBounds(lower, upper, np.array(normal), half, 0.5 * math.pi, float(np.mean(radiant)))
 
 
 @method(0)
@@ -62,6 +107,17 @@ def direction_density(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # 
 def sky(light: Table, d: Vec3) -> Vec3:
     """Radiance, RGB, that a ray going along the unit vector d finds where it meets nothing; for `infinite` lights."""
     raise NotImplementedError
+
+
+@method(4)
+def polygon(light: Table, p: Vec3) -> LightPolygon:
+    """The light as a polygon of even radiance, seen from p: what exact irradiance can be computed of."""
+    raise NotImplementedError
+
+
+@implements(polygon, Light)
+def no_polygon(light: Table, p: Vec3) -> LightPolygon:
+    return LightPolygon(0, grey(0.0), grey(0.0), grey(0.0), grey(0.0))
 
 
 @implements(sky, Light)

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from sightray._jit import implements, kernel
+from sightray._jit import implements
 from sightray.fields import Point, derived_vector, flag, number, vector
 from sightray.lights.area import GRID, RADIANCE, _AreaLight, flat_density, from_piece, place_in_grid
-from sightray.lights.base import LightSample, direction_density, illuminate
+from sightray.lights.base import LightBounds, LightSample, direction_density, flat, illuminate
 from sightray.mathlib.axes import axes_across
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3
+from sightray.mathlib.warp import concentric
 
 
 class DiskLight(_AreaLight):
@@ -44,6 +45,12 @@ class DiskLight(_AreaLight):
         """Area of one side, m²."""
         return math.pi * self.radius**2
 
+    def bounds(self) -> LightBounds:
+        normal = self.frame()[2]
+        reach = self.radius * np.sqrt(np.maximum(0.0, 1.0 - normal**2))
+        box = np.array([self.center - reach, self.center + reach])
+        return flat(box, normal, self.two_sided, np.multiply(self.radiance, self.area))
+
     def shape(self) -> Any | None:
         """The shining `Disk`, if `visible`."""
         from sightray.materials.emitter import Emitter
@@ -56,19 +63,6 @@ class DiskLight(_AreaLight):
 
 
 CENTER, _, RADIUS, TWO_SIDED, NORMAL, ACROSS, ALONG = DiskLight.offsets()[3:]
-
-
-@kernel
-def concentric(x: f64, y: f64) -> Vec3:
-    """The point of the unit disk for a point of the unit square: squares become circles, areas shrink by pi/4."""
-    a, b = 2.0 * x - 1.0, 2.0 * y - 1.0
-    if a == 0.0 and b == 0.0:
-        return Vec3(0.0, 0.0, 0.0, 0.0)
-    if abs(a) > abs(b):
-        r, phi = a, 0.25 * math.pi * (b / a)
-    else:
-        r, phi = b, 0.25 * math.pi * (2.0 - a / b)
-    return Vec3(r * math.cos(phi), r * math.sin(phi), 0.0, 0.0)
 
 
 @implements(illuminate, DiskLight)

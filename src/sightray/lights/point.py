@@ -5,7 +5,7 @@ from __future__ import annotations
 from sightray._jit import implements
 from sightray.errors import SceneError
 from sightray.fields import Color, Point, color, vector
-from sightray.lights.base import Light, LightSample, illuminate
+from sightray.lights.base import Light, LightBounds, LightSample, around, illuminate
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, vec3_at
 from sightray.mathlib.vec import Vec3, length
@@ -25,6 +25,9 @@ class PointLight(Light):
     def check(self) -> None:
         if min(self.attenuation) < 0 or max(self.attenuation) <= 0:
             raise SceneError(f"PointLight.attenuation: got {self.attenuation}; allowed: numbers >= 0, not all zero")
+
+    def bounds(self) -> LightBounds:
+        return around(self.position, 0.0, self.intensity)
 
 
 POSITION, INTENSITY, ATTENUATION = PointLight.offsets()

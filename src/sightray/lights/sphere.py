@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from sightray._jit import implements, kernel
 from sightray.fields import Point, number, vector
 from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, place_in_grid
-from sightray.lights.base import LightSample, direction_density, illuminate
+from sightray.lights.base import LightBounds, LightSample, around, direction_density, illuminate
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
-from sightray.mathlib.vec import Vec3, cross, grey, length
+from sightray.mathlib.vec import Vec3, cross, length
 
 
 class SphereLight(_AreaLight):
@@ -35,6 +37,9 @@ class SphereLight(_AreaLight):
         """Area of the surface, m²."""
         return 4 * math.pi * self.radius**2
 
+    def bounds(self) -> LightBounds:
+        return around(self.center, self.radius, np.multiply(self.radiance, math.pi * self.radius**2))
+
     def shape(self) -> Any | None:
         """The shining `Sphere`, if `visible`."""
         from sightray.materials.emitter import Emitter
@@ -55,29 +60,52 @@ def cap_of(radius: f64, d: f64) -> f64:
     return sin2 / (1.0 + math.sqrt(max(0.0, 1.0 - sin2)))
 
 
-@implements(illuminate, SphereLight)
-def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    axis = vec3_at(light, CENTER) - p
-    d, radius = length(axis), f64_at(light, RADIUS)
-    if not d > radius:
-        return LightSample(Vec3(0.0, 1.0, 0.0, 0.0), radius, grey(0.0))
-    axis = axis / d
+class Way(NamedTuple):
+    """From a point to a sphere."""
 
-    # Choose a direction in the cone; 1 - cos is taken from the sine, which does not cancel for small lights.
-    s = place_in_grid(light, cell, u, v)
-    cap = cap_of(radius, d)
-    height = s.x * cap  # 1 - cos of the direction
+    direction: Vec3  # unit
+    distance: f64  # to its near side
+    solid_angle: f64  # of the whole sphere; 0 inside of it
+
+
+@kernel
+def in_cone(axis: Vec3, cap: f64, u: f64, v: f64) -> Vec3:
+    """A direction about a unit axis, even over the cone of a half-angle whose 1 - cos is `cap`.
+
+    1 - cos of the direction is drawn, not its cosine, which would cancel for narrow cones.
+    """
+    height = u * cap
     sine = math.sqrt(max(0.0, height * (2.0 - height)))
     across = perpendicular(axis)
-    phi = 2.0 * math.pi * s.y
-    side = across * math.cos(phi) + cross(axis, across) * math.sin(phi)
-    direction = axis * (1.0 - height) + side * sine
+    phi = 2.0 * math.pi * v
+    return axis * (1.0 - height) + (across * math.cos(phi) + cross(axis, across) * math.sin(phi)) * sine
+
+
+@kernel
+def toward_sphere(p: Vec3, center: Vec3, radius: f64, u: f64, v: f64) -> Way:
+    """A direction in the cone that a sphere fills, chosen evenly by two numbers in [0, 1)."""
+    axis = center - p
+    d = length(axis)
+    if not d > radius:
+        return Way(Vec3(0.0, 1.0, 0.0, 0.0), radius, 0.0)
+    axis = axis / d
+
+    cap = cap_of(radius, d)
+    direction = in_cone(axis, cap, u, v)
 
     # Go to the near side of the sphere.
-    foot2 = radius * radius - d * d * sine * sine
+    height = u * cap  # 1 - cos of the direction
+    foot2 = radius * radius - d * d * height * (2.0 - height)
     distance = d * (1.0 - height) - math.sqrt(max(0.0, foot2))
+    return Way(direction, distance, 2.0 * math.pi * cap)
+
+
+@implements(illuminate, SphereLight)
+def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
+    s = place_in_grid(light, cell, u, v)
+    way = toward_sphere(p, vec3_at(light, CENTER), f64_at(light, RADIUS), s.x, s.y)
     n = i64_at(light, GRID)
-    return LightSample(direction, distance, vec3_at(light, RADIANCE) * (2.0 * math.pi * cap / (n * n)))
+    return LightSample(way.direction, way.distance, vec3_at(light, RADIANCE) * (way.solid_angle / (n * n)))
 
 
 @implements(direction_density, SphereLight)

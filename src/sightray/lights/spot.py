@@ -10,7 +10,7 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Color, Point, color, derived_number, derived_vector, number, vector
-from sightray.lights.base import Light, LightSample, illuminate
+from sightray.lights.base import Light, LightBounds, LightSample, illuminate
 from sightray.mathlib.axes import unit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, vec3_at
@@ -50,6 +50,10 @@ class SpotLight(Light):
             raise SceneError(f"SpotLight: position and target are the same point {self.position}; allowed: two points")
         if min(self.attenuation) < 0 or max(self.attenuation) <= 0:
             raise SceneError(f"SpotLight.attenuation: got {self.attenuation}; allowed: numbers >= 0, not all zero")
+
+    def bounds(self) -> LightBounds:
+        at = np.array(self.position)
+        return LightBounds(at, at, self.axis(), _half(self), 1e-3, float(np.mean(self.intensity)))
 
 
 POSITION, _, INTENSITY, _, _, ATTENUATION, AXIS, COS_OUTER, COS_INNER = SpotLight.offsets()

@@ -54,7 +54,7 @@ class BsdfSample(NamedTuple):
 
     wi: Vec3
     weight: Vec3  # f(wo, wi) |cos wi| / density
-    density: f64  # per solid angle; 0 where the direction is the only one possible (mirrors, smooth glass)
+    density: f64  # per solid angle; 0 where the direction is the only one possible (mirrors, smooth glass), or none is
 
 
 class BsdfValue(NamedTuple):

@@ -20,6 +20,10 @@ class Emitter(Material):
     radiance: Color = color("radiance that it gives off", default=1.0, unit="W/(m² sr)")
     two_sided: bool = flag("whether the inside of the surface glows too", default=False)
 
+    @property
+    def glow(self) -> float:
+        return sum(self.radiance) / 3
+
 
 RADIANCE, TWO_SIDED = Emitter.offsets()
 

@@ -31,6 +31,10 @@ class Lambert(Material):
     albedo: Any = textured("share of light that is reflected", default=0.5, at_most=1.0)
     emission: Color = color("radiance that the surface gives off by itself", default=0.0, unit="W/(m² sr)")
 
+    @property
+    def glow(self) -> float:
+        return sum(self.emission) / 3
+
 
 ALBEDO, EMISSION = Lambert.offsets()
 

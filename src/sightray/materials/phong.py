@@ -11,7 +11,7 @@ from sightray.materials.base import BsdfSample, BsdfValue, Local, Material, bsdf
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
-from sightray.mathlib.vec import Vec3, cross, dot, grey, max3
+from sightray.mathlib.vec import Vec3, cross, dot, grey, max4
 from sightray.mathlib.warp import cosine_hemisphere, power_cosine
 from sightray.textures.base import Where, textured, value_at
 
@@ -47,6 +47,10 @@ class Phong(Material):
     mirror: Any = textured("colour of the mirror reflection", default=0.0)
     highlight: str = choice("how the highlight is measured", HIGHLIGHTS, default="phong")
 
+    @property
+    def glow(self) -> float:
+        return sum(self.emission) / 3
+
 
 DIFFUSE, SPECULAR, AMBIENT, SHININESS, EMISSION, MIRROR, HIGHLIGHT = Phong.offsets()
 
@@ -71,9 +75,9 @@ def local_of_phong(material: Table, where: Where, cos_view: f64) -> Local:
 def parts(material: Table, where: Where) -> Vec3:
     """With which probability the diffuse part, the highlight and the mirror are sampled: by their largest channels."""
     shares = Vec3(
-        max3(value_at(table_at(material, DIFFUSE), where)),
-        max3(value_at(table_at(material, SPECULAR), where)),
-        max3(value_at(table_at(material, MIRROR), where)),
+        max4(value_at(table_at(material, DIFFUSE), where)),
+        max4(value_at(table_at(material, SPECULAR), where)),
+        max4(value_at(table_at(material, MIRROR), where)),
     )
     total = shares.x + shares.y + shares.z
     return shares / total if total > 0.0 else Vec3(1.0, 0.0, 0.0)
@@ -106,7 +110,7 @@ def sample_phong(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice
         wi = across * local_wi.x + cross(mirrored, across) * local_wi.y + mirrored * local_wi.z
     found = bsdf_of_phong(material, where, wo, wi)
     if found.density <= 0.0:
-        return BsdfSample(wi, grey(0.0), 1.0)
+        return BsdfSample(wi, grey(0.0), 0.0)
     return BsdfSample(wi, found.value / found.density, found.density)
 
 

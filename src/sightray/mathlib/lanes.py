@@ -108,6 +108,12 @@ class F64x16(Lanes):
     width, mask, dtype = 16, Mask16, np.float64
 
 
+class I64x8(Lanes):
+    """Eight integers, as keys to sort by."""
+
+    width, dtype = 8, np.int64
+
+
 def _quietly(operation: Any, a: Any, b: Any) -> Any:
     with np.errstate(all="ignore"):
         return type(a)(operation(a.values, b.values))
@@ -185,6 +191,12 @@ def low4(a: F32x8) -> F32x4:
 def high4(a: F32x8) -> F32x4:
     """The last four lanes."""
     return F32x4(a.values[4:])
+
+
+@primitive
+def repeat4(a: F32x4) -> F32x16:
+    """Four lanes, four times."""
+    return F32x16(np.tile(a.values, 4))
 
 
 @primitive
@@ -272,6 +284,45 @@ def sort_key(distance: f64) -> i64:
 
 
 @primitive
+def count_bits(bits: i64) -> i64:
+    """How many bits are set."""
+    return bits.bit_count()
+
+
+@primitive
+def highest_bit(bits: i64) -> i64:
+    """Number of the highest bit that is set; `bits` is not zero."""
+    return bits.bit_length() - 1
+
+
+@primitive
+def push8(stack: Table, top: i64, codes: F32x8, bits: i64) -> None:
+    """Write the bits of lanes as integers, one a word from word `top` on: the lanes whose bits are set. Uses eight words."""
+    picked = codes.values.view(np.uint32)[Mask8((bits >> np.arange(8)) & 1 != 0).bits]
+    stack.view(np.int64)[top : top + len(picked)] = picked
+
+
+@primitive
+def sort8(lengths: F32x8, codes: F32x8, chosen: Mask8) -> I64x8:
+    """The `sort_key` of each lane's length, with its code as low half; descending, and first those that are not chosen."""
+    keys = lengths.values.view(np.int32).astype(np.int64) << 32 | codes.values.view(np.uint32)
+    return I64x8(np.sort(np.where(chosen.bits, keys, np.iinfo(np.int64).max))[::-1])
+
+
+@primitive
+def last8(keys: I64x8) -> i64:
+    """The last of eight integers."""
+    return int(keys.values[7])
+
+
+@primitive
+def push_before_last8(stack: Table, top: i64, keys: I64x8, count: i64) -> None:
+    """Of the last `count` keys write all but the last from word `top` on. Uses eight words."""
+    picked = keys.values[8 - count : 7]
+    stack.view(np.int64)[top : top + len(picked)] = picked
+
+
+@primitive
 def select16(choice: Mask16, a: F32x16, b: F32x16) -> F32x16:
     """`a` where `choice` is true, else `b`."""
     return _select(choice.bits, a, b)
@@ -336,12 +387,6 @@ def vmax16d(a: F64x16, b: F64x16) -> F64x16:
 def abs16d(a: F64x16) -> F64x16:
     """Absolute value of each lane."""
     return F64x16(np.abs(a.values))
-
-
-@primitive
-def least16d(a: F64x16) -> f64:
-    """The smallest of sixteen doubles, none of them NaN."""
-    return float(a.values.min())
 
 
 @primitive

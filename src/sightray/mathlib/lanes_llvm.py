@@ -35,6 +35,20 @@ class MaskType(types.Type):
         super().__init__(f"Mask{width}")
 
 
+class IntegersType(types.Type):
+    """Numba's name for a number of integers of 64 bits."""
+
+    def __init__(self, width: int):
+        self.width = width
+        super().__init__(f"I64x{width}")
+
+
+@register_model(IntegersType)
+class IntegersModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, ir.VectorType(I64, kind.width))
+
+
 @register_model(LanesType)
 class LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any):
@@ -49,7 +63,7 @@ class MaskModel(models.PrimitiveModel):
 
 TYPES = {
     lanes.F32x4: LanesType(4), lanes.F32x8: LanesType(8), lanes.F32x16: LanesType(16), lanes.F64x16: LanesType(16, 64),
-    lanes.Mask4: MaskType(4), lanes.Mask8: MaskType(8), lanes.Mask16: MaskType(16),
+    lanes.I64x8: IntegersType(8), lanes.Mask4: MaskType(4), lanes.Mask8: MaskType(8), lanes.Mask16: MaskType(16),
 }  # fmt: skip
 
 
@@ -138,13 +152,18 @@ def _lower_width(width: int, scalar: Any, suffix: str, names: str) -> None:
 _lower_width(4, F32, "", "splat load store movemask vmin vmax flip")
 _lower_width(8, F32, "", "splat load store movemask vmin vmax")
 _lower_width(16, F32, "", "splat load store movemask vmin vmax flip least select")
-_lower_width(16, F64, "d", "splat load store vmin vmax abs least select product")
+_lower_width(16, F64, "d", "splat load store vmin vmax abs select product")
 
 
 def _half(first: int) -> Any:
     """Four of eight lanes."""
     chosen = ir.Constant(ir.VectorType(I32, 4), [first, first + 1, first + 2, first + 3])
     return lambda builder, a: builder.shuffle_vector(a, a, chosen)
+
+
+@lower(lanes.repeat4)
+def repeat4(builder: Any, a: Any) -> Any:
+    return builder.shuffle_vector(a, a, ir.Constant(ir.VectorType(I32, 16), [0, 1, 2, 3] * 4))
 
 
 lower(lanes.low4)(_half(0))
@@ -175,6 +194,74 @@ def lowest_bit(builder: Any, bits: Any) -> Any:
 def sort_key(builder: Any, distance: Any) -> Any:
     bits = builder.bitcast(builder.fptrunc(distance, F32), I32)
     return builder.shl(builder.sext(bits, I64), I64(32))
+
+
+def _shuffle(builder: Any, a: Any, b: Any, chosen: list[int]) -> Any:
+    """Lanes of two vectors by their numbers."""
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(chosen)), chosen))
+
+
+def _call(builder: Any, name: str, result: Any, *values: Any) -> Any:
+    """Call an intrinsic whose arguments are of several types."""
+    kind = ir.FunctionType(result, [value.type for value in values])
+    return builder.call(builder.module.globals.get(name) or ir.Function(builder.module, kind, name), values)
+
+
+def _compressed(builder: Any, values: Any, bits: Any, name: str) -> Any:
+    """The lanes whose bits are set, moved to the front."""
+    chosen = builder.bitcast(builder.trunc(bits, ir.IntType(8)), ir.VectorType(I1, 8))
+    name = f"llvm.experimental.vector.compress.{name}"
+    return _call(builder, name, values.type, values, chosen, ir.Constant(values.type, ir.Undefined))
+
+
+@lower(lanes.count_bits)
+def count_bits(builder: Any, bits: Any) -> Any:
+    return _call(builder, "llvm.ctpop.i64", I64, bits)
+
+
+@lower(lanes.highest_bit)
+def highest_bit(builder: Any, bits: Any) -> Any:
+    return builder.sub(I64(63), _call(builder, "llvm.ctlz.i64", I64, bits, I1(1)))
+
+
+@lower(lanes.push8)
+def push8(builder: Any, stack: Any, top: Any, codes: Any, bits: Any) -> None:
+    codes = _compressed(builder, builder.bitcast(codes, ir.VectorType(I32, 8)), bits, "v8i32")
+    words = builder.zext(codes, ir.VectorType(I64, 8))
+    builder.store(words, element(builder, stack, top, words.type, 8), align=8)
+
+
+@lower(lanes.sort8)
+def sort8(builder: Any, lengths: Any, codes: Any, chosen: Any) -> Any:
+    narrow, wide = ir.VectorType(I32, 8), ir.VectorType(I64, 8)
+    last = ir.Constant(narrow, [(1 << 31) - 1] * 8)
+    lengths = builder.select(chosen, builder.bitcast(lengths, narrow), last)
+    zipped = [lane // 2 + 8 * (lane % 2) for lane in range(16)]
+    keys = builder.bitcast(_shuffle(builder, builder.bitcast(codes, narrow), lengths, zipped), wide)
+
+    # A sorting network has no branches (K. Batcher, "Sorting networks and their applications", 1968).
+    for block in (2, 4, 8):
+        step = block // 2
+        while step > 0:
+            other = _shuffle(builder, keys, keys, [lane ^ step for lane in range(8)])
+            low = _call(builder, "llvm.smin.v8i64", wide, keys, other)
+            high = _call(builder, "llvm.smax.v8i64", wide, keys, other)
+            keys_of = [lane if (lane & step == 0) == (lane & block == 0) else 8 + lane for lane in range(8)]
+            keys = _shuffle(builder, high, low, keys_of)
+            step //= 2
+    return keys
+
+
+@lower(lanes.last8)
+def last8(builder: Any, keys: Any) -> Any:
+    return builder.extract_element(keys, I32(7))
+
+
+@lower(lanes.push_before_last8)
+def push_before_last8(builder: Any, stack: Any, top: Any, keys: Any, count: Any) -> None:
+    bits = builder.and_(builder.shl(I64(0xFF), builder.sub(I64(8), count)), I64(0x7F))
+    keys = _compressed(builder, keys, bits, "v8i64")
+    builder.store(keys, element(builder, stack, top, keys.type, 8), align=8)
 
 
 def _transpose(scalar: Any, size: int) -> Any:

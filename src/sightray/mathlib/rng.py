@@ -34,6 +34,12 @@ def stream(key: i64, index: i64) -> i64:
 
 
 @primitive
+def word(key: i64, dimension: i64) -> i64:
+    """The 64 random bits from which `uniform` takes its number."""
+    return _signed(_mix((key + (dimension + 1) * GOLDEN) & _MASK))
+
+
+@primitive
 def uniform(key: i64, dimension: i64) -> f64:
     """Uniform number in [0, 1) with 53 random bits, for one dimension of a stream."""
     return (_mix((key + (dimension + 1) * GOLDEN) & _MASK) >> 11) * 2.0**-53

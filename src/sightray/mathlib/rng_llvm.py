@@ -28,8 +28,13 @@ def stream(builder: Any, key: Any, index: Any) -> Any:
     return _mix(builder, builder.add(inner, builder.mul(index, _constant(rng.GOLDEN))))
 
 
+@lower(rng.word)
+def word(builder: Any, key: Any, dimension: Any) -> Any:
+    step = builder.mul(builder.add(dimension, _constant(1)), _constant(rng.GOLDEN))
+    return _mix(builder, builder.add(key, step))
+
+
 @lower(rng.uniform)
 def uniform(builder: Any, key: Any, dimension: Any) -> Any:
-    step = builder.mul(builder.add(dimension, _constant(1)), _constant(rng.GOLDEN))
-    bits = builder.lshr(_mix(builder, builder.add(key, step)), _constant(11))
+    bits = builder.lshr(word(builder, key, dimension), _constant(11))
     return builder.fmul(builder.uitofp(bits, ir.DoubleType()), ir.Constant(ir.DoubleType(), 2.0**-53))

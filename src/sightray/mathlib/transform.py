@@ -86,6 +86,18 @@ class Transform:
         """Map normals, (..., 3), by the inverse transpose; not normalised."""
         return np.asarray(n, np.float64) @ self.inverse[:3, :3]
 
+    def box(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Box around the image of a box, each (3,): infinite in all directions if the box is in any.
+
+        Interval arithmetic of an affine map (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).
+        """
+        if self.is_identity:
+            return lower, upper
+        if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+            return np.full(3, -np.inf), np.full(3, np.inf)
+        a, b = self.matrix[:3, :3] * lower, self.matrix[:3, :3] * upper
+        return self.matrix[:3, 3] + np.minimum(a, b).sum(1), self.matrix[:3, 3] + np.maximum(a, b).sum(1)
+
     @property
     def is_identity(self) -> bool:
         """Whether nothing moves."""

@@ -20,8 +20,9 @@ def turn(x: f64, y: f64) -> f64:
 
 @kernel
 def tangent_around_y(n: Vec3, q: Vec3) -> Vec3:
-    """Level direction in a surface with normal `n` at `q` that turns counter-clockwise about the y axis."""
-    if n.x == 0.0 and n.z == 0.0:
-        return Vec3(1.0, 0.0, 0.0)
+    """Derivative of a surface point `q` with normal `n` by its turn about the y axis, along a level way."""
     level = Vec3(n.z, 0.0, -n.x)
-    return level if n.x * q.x + n.z * q.z >= 0.0 else -level
+    turned = n.x * q.x + n.z * q.z  # the part of it that turns, times the distance from the axis
+    if turned == 0.0:
+        return Vec3(1.0, 0.0, 0.0) if n.x == 0.0 and n.z == 0.0 else level
+    return level * (2.0 * math.pi * (q.x * q.x + q.z * q.z) / turned)

@@ -49,8 +49,10 @@ def transmittance(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, dra
 
 
 @method(1)
-def sample_distance(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, draws: Draws) -> MediumSample:
-    """Go from o along d until light scatters, at most to t_max."""
+def sample_distance(
+    medium: Table, o: Vec3, d: Vec3, t_max: f64, beta: Vec3, bands: Table, draws: Draws
+) -> MediumSample:
+    """Go from o along d until light scatters, at most to t_max; `beta`, what each lane weighs, says for which to choose."""
     raise NotImplementedError
 
 

@@ -153,7 +153,9 @@ def transmitted(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, draws
 
 
 @implements(sample_distance, GridMedium)
-def tracked(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, draws: Draws) -> MediumSample:
+def tracked(
+    medium: Table, o: Vec3, d: Vec3, t_max: f64, beta: Vec3, bands: Table, draws: Draws
+) -> MediumSample:
     """Weighted delta tracking: absorption weighs, scattering and going on are chosen by their mean weights."""
     start, way = transform_point(table_at(medium, TO_GRID), 0, o), transform_vector(table_at(medium, TO_GRID), 0, d)
     span = span_within(medium, start, way, t_max)
@@ -169,7 +171,7 @@ def tracked(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, draws: Dr
             break
         density = density_at(medium, start + way * t) / most
         scattered, passed = weight * scattering * density, weight * (1.0 - unit * density)
-        odds = mean4(scattered) / (mean4(scattered) + mean4(passed))
+        odds = mean4(beta * scattered) / (mean4(beta * scattered) + mean4(beta * passed))
         if uniform(key, 2 * step + 1) < odds:
             return MediumSample(t, scattered / odds, True)
         weight = passed / (1.0 - odds)

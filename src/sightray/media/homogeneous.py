@@ -7,9 +7,9 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, color, number
-from sightray.mathlib.bands import as_reflectance, ones
-from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, f64_at, is_null, vec3_at
+from sightray.mathlib.bands import as_reflectance
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.vec import Vec3, max4, mean4, vexp
 from sightray.media.base import (
     Medium,
@@ -27,9 +27,9 @@ from sightray.samplers.base import Draws, pair
 class HomogeneousMedium(Medium):
     """Absorbs and scatters light alike at every place, with the phase function of Henyey and Greenstein.
 
-    Distances are chosen for one of the lanes of colour, taken at random, and weighed by the mean density of all
-    (the balance heuristic), so that none of them can be missed by the others' choice. A medium that does not scatter
-    is not sampled: its transmittance ``exp(-absorption * d)`` is exact.
+    Distances are chosen for one of the lanes of colour, taken at random by what it still weighs, and the answer is
+    divided by the mean density of all (the balance heuristic), so that none of them can be missed by the others'
+    choice. A medium that does not scatter is not sampled: its transmittance ``exp(-absorption * d)`` is exact.
     """
 
     absorption: Color = color("absorption coefficient", default=0.0, unit="1/m")
@@ -57,30 +57,34 @@ def transmitted(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, draws
 
 
 @implements(sample_distance, HomogeneousMedium)
-def free_path(medium: Table, o: Vec3, d: Vec3, t_max: f64, bands: Table, draws: Draws) -> MediumSample:
+def free_path(
+    medium: Table, o: Vec3, d: Vec3, t_max: f64, beta: Vec3, bands: Table, draws: Draws
+) -> MediumSample:
     scattering = as_reflectance(bands, vec3_at(medium, SCATTERING))
     total = extinction(medium, bands)
-    if max4(scattering) <= 0.0:
+    if max4(scattering) <= 0.0 or not max4(beta) > 0.0:
         return MediumSample(t_max, vexp(total * -t_max), False)
-    lanes = 3.0 if is_null(bands) else 4.0
+    chances = beta / (4.0 * mean4(beta))
     u = pair(draws, 0)
-    rate = lane(total, int(u.v * lanes))
+    rate = chosen_lane(total, chances, u.v)
     t = -math.log(1.0 - u.u) / rate if rate > 0.0 else math.inf
     if t < t_max:
         left = vexp(total * -t)
-        return MediumSample(t, scattering * left / (mean4(total * left) * 4.0 / lanes), True)
-    left = ones(bands) * vexp(total * -t_max)
-    return MediumSample(t_max, left / (mean4(left) * 4.0 / lanes), False)
+        return MediumSample(t, scattering * left / (4.0 * mean4(chances * total * left)), True)
+    left = vexp(total * -t_max)
+    return MediumSample(t_max, left / (4.0 * mean4(chances * left)), False)
 
 
 @kernel
-def lane(v: Vec3, index: i64) -> f64:
-    """One of the four lanes, by its number."""
-    if index == 0:
+def chosen_lane(v: Vec3, chances: Vec3, u: f64) -> f64:
+    """One of the four lanes of v, by their chances."""
+    if u < chances.x:
         return v.x
-    if index == 1:
+    if u < chances.x + chances.y:
         return v.y
-    return v.z if index == 2 else v.w
+    if u < chances.x + chances.y + chances.z or chances.w <= 0.0:
+        return v.z if chances.z > 0.0 else (v.y if chances.y > 0.0 else v.x)
+    return v.w
 
 
 @implements(phase, HomogeneousMedium)

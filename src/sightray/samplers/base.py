@@ -14,7 +14,7 @@ on threads, tiles or order, and an interrupted one goes on where it was.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from sightray._jit import implements, kernel, method
 from sightray.mathlib.rng import stream
@@ -39,12 +39,14 @@ class Draws(NamedTuple):
     pixel: i64  # column + 65536 row
     key: i64  # names the pixel and the bounce
     sample: i64  # its number in the pixel
-    samples: i64  # that the pixel will take, as far as it is known; else 0
+    samples: i64  # that the pixel will take; 0 where that is not known
     dimension: i64  # dimensions that came before
 
 
 class Sampler(Member, family="samplers"):
     """Base of all samplers."""
+
+    counts: ClassVar[bool] = False  # whether the pattern depends on how many samples a pixel takes
 
 
 @method(0)
@@ -55,7 +57,7 @@ def draw(sampler: Table, draws: Draws, dimension: i64) -> Pair:
 
 @method(1)
 def begin(sampler: Table, x: i64, y: i64, seed: i64, sample: i64, samples: i64) -> Draws:
-    """The draws of sample number `sample` of `samples` of the pixel in column x and row y."""
+    """The draws of sample number `sample` of the pixel in column x and row y, which takes `samples`; 0: not known."""
     raise NotImplementedError
 
 
@@ -88,6 +90,6 @@ def nested(draws: Draws, level: i64) -> Draws:
 
 def default_sampler() -> Sampler:
     """The sampler of pictures for which none is chosen."""
-    from sightray.samplers.independent import IndependentSampler
+    from sightray.samplers.sobol import SobolSampler
 
-    return IndependentSampler()
+    return SobolSampler()

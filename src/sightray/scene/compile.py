@@ -9,18 +9,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sightray import _jit
+from sightray._jit import METHOD_SLOTS
 from sightray.accelerators import item as item_row
 from sightray.errors import SceneError
 from sightray.lights.base import Light
 from sightray.materials.lambert import Lambert
+from sightray.mathlib.motion import Placement
 from sightray.mathlib.table import Space, Table, aligned, link, set_methods
 from sightray.mathlib.transform import IDENTITY, Transform, put_columns
 from sightray.registry import Member
 from sightray.scene import world as world_row
 from sightray.scene.instance import Group, Instance
+from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
 from sightray.scene.scene import Scene
+from sightray.scene.world import light_count
 from sightray.shapes.base import Shape
+from sightray.shapes.moving import _Moving
 
 DEFAULT_MATERIAL = Lambert(albedo=0.5)
 Report = Callable[[int, int, str], None]  # kernels compiled, kernels to compile, name of the next
@@ -34,6 +39,7 @@ class Item(NamedTuple):
     transform: Transform
     object: int  # index of the scene's object that it belongs to
     name: str
+    placement: Placement | None = None  # of what moves: `transform` is where it is at time 0
 
 
 class Tables:
@@ -42,6 +48,8 @@ class Tables:
     def __init__(self) -> None:
         self.space = Space()
         self._rows: dict[int, tuple[Member, Table]] = {}
+        self._alike: list[np.ndarray] = []  # rows that have the methods of their first one
+        self._waiting: dict[Callable, Callable[[], None]] = {}
         self._ready: dict[tuple[Callable, bool], int] = {}  # how many rows there were when methods were filled in
 
     def row_of(self, member: Member) -> Table:
@@ -57,11 +65,34 @@ class Tables:
         """Know a row that was packed elsewhere."""
         self._rows[id(member)] = (member, row)
 
+    def add_alike(self, member: Member, values: np.ndarray) -> list[Table]:
+        """Know many rows, (n, words) float64, that are all `member` as far as their methods go."""
+        rows = [self.space.array(row) for row in values]
+        for row in rows:
+            row.functions = rows[0].functions
+        self._alike.append(values.view(np.int64)[:, :METHOD_SLOTS])
+        self.add(member, rows[0])
+        return rows
+
+    def once_reached(self, function: Callable, action: Callable[[], None]) -> None:
+        """Put off packing until a kernel is prepared that can reach `function`."""
+        self._waiting[function] = action
+
+    def _catch_up(self, root: Callable) -> None:
+        """Do what was put off until now."""
+        needed = _jit.needed_kernels(root, dict.fromkeys(type(member) for member, _ in self._rows.values()))
+        roots = (root, *(k for slots in needed.values() for k in slots.values()))
+        reached = {callee for k in roots for callee in _jit.reachable(k)}
+        for function in [f for f in self._waiting if f in reached]:
+            self._waiting.pop(function)()
+
     def prepare(self, root: Callable, report: Report | None = None, compiled: bool | None = None) -> None:
         """Fill in the methods that the kernel `root` can reach, compiling what the cache does not have."""
         compiled = _jit.enabled() if compiled is None else compiled
         if self._ready.get((root, compiled)) == len(self._rows):
             return
+        if self._waiting:
+            self._catch_up(root)
         rows = list(self._rows.values())
         needed = _jit.needed_kernels(root, dict.fromkeys(type(member) for member, _ in rows))
         kernels = list(dict.fromkeys(itertools.chain([root], *(slots.values() for slots in needed.values()))))
@@ -76,6 +107,8 @@ class Tables:
         addresses = {k: _jit.address(k) if compiled else 0 for k in kernels}
         for member, row in rows:
             set_methods(row, [(slot, k, addresses[k]) for slot, k in needed[type(member)].items()])
+        for methods in self._alike:
+            methods[1:] = methods[0]
         self._ready[root, compiled] = len(self._rows)
 
 
@@ -95,22 +128,17 @@ class Compiled:
         lower, upper = self._pack_items(items)
         tree = accelerator.build_scene(space, items, lower, upper, self.items)
         tables.add(accelerator, tree)
-        lights = space.row(max(1, len(scene.lights)))
-        for index, light in enumerate(scene.lights):
-            link(lights, index, tables.row_of(light))
         world = space.row(world_row.WORLD_WORDS)
+        lamps, own = scene.lights, set(light_indices(scene))
+        pack_lamps(world, tables, lamps)
+        tables.once_reached(light_count, lambda: pack_glow(world, tables, lamps, items, self.items, own))
         link(world, world_row.TREE, tree)
         link(world, world_row.ITEMS, items)
-        link(world, world_row.LIGHTS, lights)
         world.view(np.int64)[world_row.MERGED] = world_row.NONE if self.merged is None else len(self.items)
         link(world, world_row.ORIGIN, None if self.merged is None else space.array(self.merged.origin))
-        world.view(np.int64)[world_row.LIGHT_COUNT] = len(scene.lights)
         integers = items.view(np.int64).reshape(-1, item_row.ITEM_WORDS)
         world.view(np.int64)[world_row.FLAGS] = np.bitwise_or.reduce(integers[:, item_row.FLAGS])
         link(world, world_row.MEDIUM, None if scene.medium is None else tables.row_of(scene.medium))
-        skies = np.array([k for k, light in enumerate(scene.lights) if light.infinite], np.int64)
-        link(world, world_row.SKIES, space.array(skies) if len(skies) else None)
-        world.view(np.int64)[world_row.SKY_COUNT] = len(skies)
         if scene.camera is not None:
             link(world, world_row.CAMERA, tables.row_of(scene.camera))
         numbers = world.view(np.float64)
@@ -130,7 +158,12 @@ class Compiled:
             start = index * item_row.ITEM_WORDS
             integers[start + item_row.SHAPE] = self.tables.row_of(item.shape).address
             integers[start + item_row.MATERIAL] = self.tables.row_of(item.material).address
-            integers[start + item_row.MOVED] = not item.transform.is_identity
+            integers[start + item_row.MOVED] = item_row.PLACED if not item.transform.is_identity else item_row.UNMOVED
+            integers[start + item_row.MET] = integers[start + item_row.SHAPE]
+            if item.placement is not None:
+                moving = _Moving(shape=item.shape, placement=item.placement)
+                integers[start + item_row.MOVED] = item_row.MOVING
+                integers[start + item_row.MET] = self.tables.row_of(moving).address
             integers[start + item_row.OBJECT] = item.object
             integers[start + item_row.LIGHT] = lights.get(item.object, -1)
             integers[start + item_row.FLAGS] = flags_of(item.material)
@@ -161,11 +194,11 @@ def flatten(scene: Scene) -> Iterator[Item]:
         if isinstance(thing, Light):
             thing = thing.shape()
         if thing is not None:
-            yield from _flatten(thing, Transform(), None, index, "")
+            yield from _flatten(thing, Placement(), None, index, "")
 
 
-def _flatten(thing: Any, place: Transform, material: Member | None, index: int, name: str) -> Iterator[Item]:
-    here = place if thing.transform.is_identity else place @ thing.transform
+def _flatten(thing: Any, place: Placement, material: Member | None, index: int, name: str) -> Iterator[Item]:
+    here = place.within(thing.transform, getattr(thing, "motion", None))
     name = name or thing.name
     if isinstance(thing, Group):
         for part in thing.objects:
@@ -173,24 +206,20 @@ def _flatten(thing: Any, place: Transform, material: Member | None, index: int, 
     elif isinstance(thing, Instance):
         yield from _flatten(thing.of, here, material or thing.material, index, name)
     else:
-        yield Item(thing, material or thing.material or DEFAULT_MATERIAL, here, index, name)
+        moving = here if here.moves else None
+        yield Item(thing, material or thing.material or DEFAULT_MATERIAL, here.at(0.0), index, name, moving)
 
 
 def world_bounds(item: Item) -> tuple[np.ndarray, np.ndarray]:
-    """Box around an item in the world: the box of the transformed corners; infinite stays infinite."""
-    lower, upper = item.shape.bounds()
-    if item.transform.is_identity or not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-        finite = item.transform.is_identity
-        return (lower, upper) if finite else (np.full(3, -np.inf), np.full(3, np.inf))
-    # Interval arithmetic of an affine map (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).
-    m = item.transform.matrix
-    a, b = m[:3, :3] * lower, m[:3, :3] * upper
-    return m[:3, 3] + np.minimum(a, b).sum(1), m[:3, 3] + np.maximum(a, b).sum(1)
+    """Box around an item in the world, at all times; infinite stays infinite."""
+    if item.placement is not None:
+        return item.placement.bounds(*item.shape.bounds())
+    return item.transform.box(*item.shape.bounds())
 
 
 def flags_of(material: Any) -> int:
     """What a material is beside a plain surface, as the bits of an item's FLAGS."""
-    kinds = ("cutout", "bumpy", "oriented", "clear", "thin", "translucent")  # in the order of the bits
+    kinds = ("cutout", "bumpy", "oriented", "clear", "thin", "translucent")  # in the order of the bits CUTOUT, BUMPY, ...
     return sum(1 << bit for bit, kind in enumerate(kinds) if getattr(material, kind))
 
 

@@ -29,12 +29,15 @@ class Merged(NamedTuple):
 
 
 def merge_small_meshes(items: Sequence[Any]) -> Merged | None:
-    """Join what is worth joining among a scene's items (each with ``shape`` and ``transform``); None if nothing is."""
+    """Join what is worth joining among a scene's items; None if nothing is."""
     shown = Counter(id(item.shape) for item in items if isinstance(item.shape, Mesh))
     small = [
         index
         for index, item in enumerate(items)
-        if shown[id(item.shape)] == 1 and item.transform.is_identity and len(item.shape.faces) <= SMALL
+        if shown[id(item.shape)] == 1
+        and item.transform.is_identity
+        and item.placement is None
+        and len(item.shape.faces) <= SMALL
     ]
     total = np.cumsum([len(items[index].shape.faces) for index in small])
     small = small[: int(np.searchsorted(total, MOST, side="right"))]

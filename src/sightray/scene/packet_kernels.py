@@ -1,4 +1,4 @@
-"""Batches of rays, 64 at a time in four packets, for scenes of few items: `query_kernels` with packets (see `bvh.packets`).
+"""Batches of rays, 256 at a time in packets, for scenes of few items: `query_kernels` with packets (see `bvh.packets`).
 
 Every item is asked in turn, so no tree over items is walked; up to `FEW_ITEMS` that is the faster way. Meshes are met by
 packets, other shapes ray by ray. Columns and forms are those of `query_kernels`.
@@ -18,10 +18,10 @@ from sightray.accelerators.item import (
     item_at,
     occluded_item,
 )
-from sightray.bvh.bundles import lane_of, packet_vec3
+from sightray.bvh.bundles import packet_vec3
 from sightray.bvh.bvh8 import int_at
 from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
-from sightray.bvh.packets import any_rays, closest_rays
+from sightray.bvh.packets import PACKETS, ROOM_WORDS, any_rays, closest_rays
 from sightray.mathlib.lanes import (
     load16d,
     mask16,
@@ -35,7 +35,7 @@ from sightray.mathlib.lanes import (
 )
 from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, advance, f64_at, f64_put, i32_put, i64_at, scratch, table_at
+from sightray.mathlib.table import Table, advance, f64_at, f64_put, i32_put, i64_at, i64_put, scratch, table_at
 from sightray.mathlib.transform import transform_point, transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.scene.crossings import MESH
@@ -43,6 +43,7 @@ from sightray.scene.query_kernels import LOOK, number_at, triple_at
 from sightray.scene.world import ITEMS
 
 FEW_ITEMS = 4
+RAYS = 16 * PACKETS  # that go together
 SINGLE_ROWS, DOUBLE_ROWS = 7, 6  # forms of contiguous (n, 3) arrays
 
 
@@ -87,8 +88,8 @@ def fill_packets(
     origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table, e_form: i64, first: i64, n: i64,
     packets: Table,
 ) -> i64:  # fmt: skip
-    """Read the up to 64 rays from `first` on into packets; the number of these."""
-    count = (min(64, n - first) + 15) // 16
+    """Read the rays from `first` on into up to sixteen packets; the number of these."""
+    count = (min(RAYS, n - first) + 15) // 16
     for p in range(count):
         start = first + 16 * p
         packet = advance(packets, p * PACKET_WORDS)
@@ -110,41 +111,55 @@ def move_packets(item: Table, packets: Table, count: i64, moved: Table) -> None:
 
 
 @kernel
-def closest_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
+def closest_of_packets(
+    item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64, found: Table, room: Table
+) -> None:
     """The rays of packets that meet an item before their end, which is brought there."""
     if is_mesh and i64_at(item, MOVED) == 0:
-        return closest_rays(table_at(item, SHAPE), packets, count, t_min)
-    found = 0
-    if is_mesh:
+        closest_rays(table_at(item, SHAPE), packets, count, t_min, found, room)
+    elif is_mesh:
         move_packets(item, packets, count, moved)
-        found = closest_rays(table_at(item, SHAPE), moved, count, t_min)
+        closest_rays(table_at(item, SHAPE), moved, count, t_min, found, room)
         for p in range(count):
             packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
-            better = mask16((found >> (16 * p)) & 0xFFFF)
+            better = mask16(i64_at(found, p))
             store16d(packet, END, select16d(better, load16d(there, END), load16d(packet, END)))
             store16d(packet, PRIM, select16d(better, load16d(there, PRIM), load16d(packet, PRIM)))
-        return found
-    for k in range(16 * count):
-        at = lane_of(k)
-        o, d, t_max = packet_vec3(packets, ORIGIN + at), packet_vec3(packets, DIRECTION + at), f64_at(packets, END + at)
-        if t_min < t_max and is_ray(o, d):
-            hit = intersect_item(item, o, d, t_min, t_max)
-            if hit.t < t_max:
-                f64_put(packets, END + at, hit.t)
-                f64_put(packets, PRIM + at, float(hit.prim))
-                found |= 1 << k
-    return found
+    else:
+        for p in range(count):
+            i64_put(found, p, 0)
+            packet = advance(packets, p * PACKET_WORDS)
+            for lane in range(16):
+                o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
+                t_max = f64_at(packet, END + lane)
+                if t_min < t_max and is_ray(o, d):
+                    hit = intersect_item(item, o, d, t_min, t_max)
+                    if hit.t < t_max:
+                        f64_put(packet, END + lane, hit.t)
+                        f64_put(packet, PRIM + lane, float(hit.prim))
+                        i64_put(found, p, i64_at(found, p) | 1 << lane)
+
+
+@kernel
+def closest_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
+    """`closest_of_packets` for up to four packets, with working memory of its own; the bits of the rays."""
+    found, room, bits = scratch(16), scratch(ROOM_WORDS), 0
+    closest_of_packets(item, is_mesh, packets, count, moved, t_min, found, room)
+    for p in range(count):
+        bits |= i64_at(found, p) << (16 * p)
+    return bits
 
 
 @kernel
 def closest_of_few(
     world: Table, kinds: Table, n_items: i64, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table,
-    e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table,
+    e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table, room: Table,
 ) -> None:  # fmt: skip
     """The nearest hit of each ray: float64 t, and int32 item, object and primitive, -1 where there is none."""
-    packets, moved, item, thing = scratch(512), scratch(512), scratch(64), scratch(64)
+    packets, moved, item, thing = scratch(2048), scratch(2048), scratch(256), scratch(256)
+    met, found = scratch(16), scratch(16)
     rows, none = table_at(world, ITEMS), splat16d(-1.0)
-    for first in range(0, n, 64):
+    for first in range(0, n, RAYS):
         if first & LOOK == 0 and i64_at(stop, 0) != 0:
             return
         count = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets)
@@ -154,13 +169,14 @@ def closest_of_few(
             store16d(thing, 16 * p, none)
 
         # Each item brings the ends nearer of the rays that meet it.
-        found = 0
+        for p in range(count):
+            i64_put(found, p, 0)
         for index in range(n_items):
             row = item_at(rows, index)
-            met = closest_of_item(row, int_at(kinds, index) == MESH, packets, count, moved, t_min)
-            found |= met
+            closest_of_packets(row, int_at(kinds, index) == MESH, packets, count, moved, t_min, met, room)
             for p in range(count):
-                these = mask16((met >> (16 * p)) & 0xFFFF)
+                i64_put(found, p, i64_at(found, p) | i64_at(met, p))
+                these = mask16(i64_at(met, p))
                 store16d(item, 16 * p, select16d(these, splat16d(float(index)), load16d(item, 16 * p)))
                 number = splat16d(float(i64_at(row, OBJECT)))
                 store16d(thing, 16 * p, select16d(these, number, load16d(thing, 16 * p)))
@@ -168,7 +184,7 @@ def closest_of_few(
         # Write the answers: sixteen at a time, and the rest one by one.
         for p in range(count):
             start, packet = first + 16 * p, advance(packets, p * PACKET_WORDS)
-            met16 = mask16((found >> (16 * p)) & 0xFFFF)
+            met16 = mask16(i64_at(found, p))
             store16d(packet, END, select16d(met16, load16d(packet, END), splat16d(math.inf)))
             if start + 16 <= n:
                 store16d(t, start, load16d(packet, END))
@@ -184,39 +200,45 @@ def closest_of_few(
 
 
 @kernel
-def any_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
+def any_of_packets(
+    item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64, found: Table, room: Table
+) -> None:
     """The rays of packets that meet an item before their end."""
     if is_mesh and i64_at(item, MOVED) == 0:
-        return any_rays(table_at(item, SHAPE), packets, count, t_min)
-    if is_mesh:
+        any_rays(table_at(item, SHAPE), packets, count, t_min, found, room)
+    elif is_mesh:
         move_packets(item, packets, count, moved)
-        return any_rays(table_at(item, SHAPE), moved, count, t_min)
-    found = 0
-    for k in range(16 * count):
-        at = lane_of(k)
-        o, d, t_max = packet_vec3(packets, ORIGIN + at), packet_vec3(packets, DIRECTION + at), f64_at(packets, END + at)
-        if t_min < t_max and is_ray(o, d) and occluded_item(item, o, d, t_min, t_max):
-            found |= 1 << k
-    return found
+        any_rays(table_at(item, SHAPE), moved, count, t_min, found, room)
+    else:
+        for p in range(count):
+            i64_put(found, p, 0)
+            packet = advance(packets, p * PACKET_WORDS)
+            for lane in range(16):
+                o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
+                t_max = f64_at(packet, END + lane)
+                if t_min < t_max and is_ray(o, d) and occluded_item(item, o, d, t_min, t_max):
+                    i64_put(found, p, i64_at(found, p) | 1 << lane)
 
 
 @kernel
 def any_of_few(
     world: Table, kinds: Table, n_items: i64, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table,
-    e_form: i64, t_min: f64, n: i64, blocked: Table, stop: Table,
+    e_form: i64, t_min: f64, n: i64, blocked: Table, stop: Table, room: Table,
 ) -> None:  # fmt: skip
     """Whether each ray meets anything: one byte a ray; `blocked` is sixteen bytes longer than n."""
-    packets, moved = scratch(512), scratch(512)
+    packets, moved, met, found = scratch(2048), scratch(2048), scratch(16), scratch(16)
     rows = table_at(world, ITEMS)
-    for first in range(0, n, 64):
+    for first in range(0, n, RAYS):
         if first & LOOK == 0 and i64_at(stop, 0) != 0:
             return
-        count, found = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets), 0
+        count = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets)
+        for p in range(count):
+            i64_put(found, p, 0)
         for index in range(n_items):
-            met = any_of_item(item_at(rows, index), int_at(kinds, index) == MESH, packets, count, moved, t_min)
-            found |= met
+            any_of_packets(item_at(rows, index), int_at(kinds, index) == MESH, packets, count, moved, t_min, met, room)
             for p in range(count):  # who is blocked need not ask the next item
-                end, these = load16d(packets, p * PACKET_WORDS + END), mask16((met >> (16 * p)) & 0xFFFF)
+                i64_put(found, p, i64_at(found, p) | i64_at(met, p))
+                end, these = load16d(packets, p * PACKET_WORDS + END), mask16(i64_at(met, p))
                 store16d(packets, p * PACKET_WORDS + END, select16d(these, splat16d(math.nan), end))
         for p in range(count):
-            put_bytes16(blocked, (first >> 3) + 2 * p, mask16((found >> (16 * p)) & 0xFFFF))
+            put_bytes16(blocked, (first >> 3) + 2 * p, mask16(i64_at(found, p)))

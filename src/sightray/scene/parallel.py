@@ -13,7 +13,8 @@ import numpy as np
 from sightray.mathlib.table import Table, aligned
 
 FEW = 2048  # rays that are not worth waking a thread: a tenth of a millisecond
-CHUNK = 8192  # rays; a multiple of four, see `any_of_rays`
+CHUNKS = 16  # for each thread, so that all end at about the same time
+LEAST, MOST = 8192, 32768  # rays of a chunk: many, lest Python have much to do; few enough to be converted in passing
 POLL = 0.1  # seconds between looks at the keyboard
 
 _NEVER = Table(aligned(1, np.int64))  # the stop word of small batches
@@ -46,7 +47,7 @@ def _start(helpers: int, work: Callable[[], None]) -> list[Future]:
         return [_pool.submit(work) for _ in range(helpers)]
 
 
-def run_chunks(n: int, work: Callable[[int, int, Table], None], threads: int | None = None, chunk: int = CHUNK) -> None:
+def run_chunks(n: int, work: Callable[[int, int, Table], None], threads: int | None = None, chunk: int = 0) -> None:
     """Call ``work(first, last, stop)`` for all chunks of n rays, on several threads.
 
     On Ctrl-C, and when a chunk fails, the stop word is set: kernels look at it, no chunk is begun, and the exception is
@@ -57,8 +58,10 @@ def run_chunks(n: int, work: Callable[[int, int, Table], None], threads: int | N
             work(0, n, _NEVER)
         return
     stop = Table(aligned(1, np.int64))
+    threads = core_count() if threads is None else threads
+    chunk = chunk or min(max(n // (CHUNKS * threads), LEAST), MOST) // 256 * 256  # kernels take 256 rays at a time
     chunks = -(-n // chunk)
-    helpers = min(core_count() if threads is None else threads, chunks) - 1
+    helpers = min(threads, chunks) - 1
     queue = itertools.count()
     word = stop.view(np.int64)
 

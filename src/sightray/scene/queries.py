@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from sightray._jit import native
 from sightray.accelerators.bvh import pack_items
+from sightray.bvh.packets import ROOM_WORDS
 from sightray.errors import SceneError
 from sightray.mathlib.table import Table, aligned, table_at
 from sightray.scene.columns import Column, Output, common_shape, numbers
@@ -52,14 +54,19 @@ class Asked:
     def closest(self) -> Callable:
         """The kernel for the nearest hit, with its scene: by packets where a mesh is among few items."""
         if self.packets:
-            return partial(self.kernel(closest_of_few), self.world, self.kinds, len(self.objects))
+            return self.with_room(closest_of_few)
         return partial(self.kernel(closest_of_rays), self.world)
 
     def any(self) -> Callable:
         """The kernel for any hit, with its scene."""
         if self.packets:
-            return partial(self.kernel(any_of_few), self.world, self.kinds, len(self.objects))
+            return self.with_room(any_of_few)
         return partial(self.kernel(any_of_rays), self.world)
+
+    def with_room(self, function: Callable) -> Callable:
+        """A kernel of packets, with its scene, and with working memory for each thread."""
+        run = partial(self.kernel(function), self.world, self.kinds, len(self.objects))
+        return lambda *arguments: run(*arguments, room())
 
     def tree(self) -> Table:
         """A tree over the items as they are: that of the world may have put small meshes together."""
@@ -68,6 +75,17 @@ class Asked:
             table = table_at(self.world, ITEMS)
             self._tree = pack_items(self.compiled.tables.space, table, bounds[:, 0].copy(), bounds[:, 1].copy())
         return self._tree
+
+
+_rooms = threading.local()
+
+
+def room() -> Table:
+    """Working memory of the calling thread."""
+    found = vars(_rooms).get("room")
+    if found is None:
+        found = _rooms.room = Table(aligned(ROOM_WORDS, np.int64))
+    return found
 
 
 def asked(scene: Any) -> Asked:
@@ -149,7 +167,7 @@ def occluded(
 ) -> np.ndarray:
     rays, ready = Rays("occluded", origins, directions, t_max, t_min, precision, threads), asked(scene)
     run = ready.any()
-    blocked = np.zeros(rays.n + 16, np.uint8)  # kernels write four or sixteen answers at a time
+    blocked = np.empty(rays.n + 16, np.uint8)  # kernels write four or sixteen answers at a time
 
     output = Output(blocked)
 

@@ -77,7 +77,7 @@ def any_of_rays(
     world: Table, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table, e_form: i64, t_min: f64,
     n: i64, blocked: Table, stop: Table,
 ) -> None:  # fmt: skip
-    """Whether each ray meets anything: one byte a ray; `blocked` is zero before, and eight bytes longer than n."""
+    """Whether each ray meets anything: one byte a ray; `blocked` is eight bytes longer than n."""
     word = 0
     for i in range(n):
         if i & LOOK == LOOK and i64_at(stop, 0) != 0:

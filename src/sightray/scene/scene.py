@@ -9,7 +9,7 @@ from sightray.errors import SceneError
 from sightray.fields import Color, child, choice, color, integer, other, text
 from sightray.lights.base import Light
 from sightray.registry import Member
-from sightray.scene.instance import _Placed
+from sightray.scene.instance import _Placed, frozen
 from sightray.shapes.base import Shape
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ class Scene(Member, family="scene"):
     medium : what fills the space around the objects, such as fog; None for a vacuum.
     integrator : used by `render` where none is given.
     samples : per pixel, used by `render` where none are given.
-    transfer : how bytes are made: "srgb" (round) or "floor" (the course rule: no gamma, rounded down).
+    transfer : how bytes are made: "srgb" (round), "floor" (the course rule: no gamma, rounded down) or "gamma2.2" (the
+        course rule with gamma).
     """
 
     objects: tuple[Any, ...] = other("shapes, lights, groups and instances", _objects, default=(), plain=list)
@@ -52,7 +53,7 @@ class Scene(Member, family="scene"):
                         packed=False)  # fmt: skip
     integrator: Any = child("how light is computed", "integrators", default=None, optional=True, packed=False)
     samples: int = integer("rays of sight per pixel", default=1, at_least=1, at_most=1 << 20)
-    transfer: str = choice("how bytes are made", ("srgb", "floor"), default="srgb")
+    transfer: str = choice("how bytes are made", ("srgb", "floor", "gamma2.2"), default="srgb")
     name: str = text("title", default="")
 
     def __init__(self, *objects: Any, **values: Any) -> None:
@@ -68,6 +69,13 @@ class Scene(Member, family="scene"):
 
     def __repr__(self) -> str:
         return f"<Scene {self.name or 'untitled'}: {len(self.objects)} objects, {len(self.lights)} of them lights>"
+
+    def at(self, time: float) -> Scene:
+        """The scene as it is at a time, seconds: nothing in it moves. The camera stays as it is.
+
+        Queries see a scene at time 0; ask ``scene.at(time).intersect(...)`` about other moments.
+        """
+        return self.replace(objects=[frozen(thing, time) for thing in self.objects])
 
     def intersect(self, origins: Any, directions: Any, t_max: Any = math.inf, *, t_min: float = 0.0,
                   precision: str = "exact", threads: int | None = None) -> Hits:  # fmt: skip

@@ -10,16 +10,17 @@ from sightray.accelerators.item import (
     BUMPY,
     CUTOUT,
     LIGHT,
+    LIGHT_STEP,
     MATERIAL,
     ItemHit,
     item_at,
     item_surface,
-    normal_in_object,
+    normal_in_object_at,
     to_object,
 )
 from sightray.accelerators.item import FLAGS as ITEM_FLAGS
 from sightray.bvh.bvh8 import int_at
-from sightray.cameras.base import SPREAD
+from sightray.cameras.base import APART, SPREAD
 from sightray.lights.base import sky
 from sightray.materials.base import bent_normal, opacity
 from sightray.mathlib.rng import stream, uniform
@@ -32,9 +33,11 @@ TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4
 MERGED, ORIGIN = 5, 6  # item number of the small meshes put together, or NONE; whose triangles its triangles are
 BACKGROUND, AMBIENT = 8, 12
 FLAGS, MEDIUM, SKIES, SKY_COUNT, CHOOSER = 16, 17, 18, 19, 20  # SKIES: numbers of the lights that are infinite
+LAMP_COUNT = 21  # lights that the scene states; surfaces that glow come behind them
 WORLD_WORDS = 24
 NONE = -2
 SIEVE = 1e6  # places per metre at which a ray may fall through a half-open surface or not
+SLANT = 0.01  # cosine below which footprints grow no longer
 GRAZING = 1e-3  # cosine of the viewer and a shading normal that was bent
 
 
@@ -69,7 +72,8 @@ def thin_beam() -> Beam:
 @kernel
 def sight_beam(world: Table, bands: Table) -> Beam:
     """A ray of sight, as wide as the camera's pixels."""
-    return Beam(0.0, f64_at(table_at(world, CAMERA), SPREAD), bands)
+    camera = table_at(world, CAMERA)
+    return Beam(f64_at(camera, APART), f64_at(camera, SPREAD), bands)
 
 
 @kernel
@@ -117,17 +121,21 @@ def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3, beam: Beam) -> Point:
     """All that shading needs to know of a hit."""
     item = item_at(table_at(world, ITEMS), hit.item)
     p = o + d * hit.t
+    p = Vec3(p.x, p.y, p.z, o.w)  # the same time all along the ray, whatever the direction's 4th lane holds
     p_object = to_object(item, p)
     s = item_surface(item, hit, p_object)
     shading = normalize(s.shading)
     material, flags = table_at(item, MATERIAL), i64_at(item, ITEM_FLAGS)
     stretch = length(s.tangent)
-    width = (beam.width + beam.spread * hit.t) / stretch if stretch > 0.0 else 0.0
-    where = Where(s.u, s.v, p_object, normal_in_object(item, s.normal), width, beam.bands)
+    n = normalize(s.normal)
+    slant = max(abs(dot(n, d)), SLANT)  # a footprint is long where a surface is seen at a slant
+    width = (beam.width + beam.spread * hit.t) / (stretch * slant) if stretch > 0.0 else 0.0
+    where = Where(s.u, s.v, p_object, normal_in_object_at(item, s.normal, o.w), width, beam.bands)
     if flags & BUMPY != 0:
         shading = bent(shading, s.tangent, bent_normal(material, where, stretch))
+    light = i64_at(item, LIGHT) + i64_at(item, LIGHT_STEP) * hit.prim
     return Point(
-        p, normalize(s.normal), shading, -dot(shading, d), material, where, i64_at(item, LIGHT), s.tangent, flags,
+        p, n, shading, -dot(shading, d), material, where, light, s.tangent, flags,
     )  # fmt: skip
 
 
@@ -167,8 +175,14 @@ def light_at(world: Table, index: i64) -> Table:
 
 @kernel
 def light_count(world: Table) -> i64:
-    """Number of lights."""
+    """Number of lights, with surfaces that glow."""
     return i64_at(world, LIGHT_COUNT)
+
+
+@kernel
+def lamp_count(world: Table) -> i64:
+    """Number of lights that the scene states; they have the lowest numbers."""
+    return i64_at(world, LAMP_COUNT)
 
 
 @kernel

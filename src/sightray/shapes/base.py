@@ -24,7 +24,7 @@ from sightray.mathlib.hit import Hit, is_hit
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table
 from sightray.mathlib.transform import Transform, as_transform
-from sightray.mathlib.vec import Vec3
+from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 
 
@@ -69,6 +69,20 @@ def occluded(shape: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
 def surface(shape: Table, hit: Hit, p: Vec3) -> Surface:
     """The surface at the point p of a hit, in object space."""
     raise NotImplementedError
+
+
+@method(3)
+def rise(shape: Table, hit: Hit, p: Vec3, side: f64) -> Vec3:
+    """The way from p, in object space, up to the surface that the shading normals pretend; `side` is 1 outside, else -1.
+
+    It is zero, unless the shape's shading normals differ from its own.
+    """
+    raise NotImplementedError
+
+
+@implements(rise, Shape)
+def as_round_as_it_is(shape: Table, hit: Hit, p: Vec3, side: f64) -> Vec3:
+    return grey(0.0)
 
 
 @implements(occluded, Shape)

@@ -71,5 +71,5 @@ def surface_of_disk(disk: Table, hit: Hit, p: Vec3) -> Surface:
     r, inner = f64_at(disk, RADIUS), f64_at(disk, INNER)
     rho = math.sqrt(q.x * q.x + q.y * q.y)
     v = min(1.0, max(0.0, (rho - inner) / (r - inner)))
-    around = Vec3(-q.y, q.x, 0.0) if rho > 0.0 else Vec3(0.0, 1.0, 0.0)
+    around = Vec3(-q.y, q.x, 0.0) * (2.0 * math.pi) if rho > 0.0 else Vec3(0.0, 1.0, 0.0)
     return Surface(n, n, turn(q.x, q.y), v, transform_vector(disk, AXES, around))

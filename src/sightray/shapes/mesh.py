@@ -19,10 +19,10 @@ from sightray.bvh.triangles import (
 from sightray.errors import SceneError
 from sightray.fields import REQUIRED, Derived, Field, array
 from sightray.mathlib.hit import Hit
-from sightray.mathlib.scalars import i64
+from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i32_at, is_null, table_at
-from sightray.mathlib.vec import Vec3, cross, dot
-from sightray.shapes.base import Shape, Surface, intersect, occluded, surface
+from sightray.mathlib.vec import Vec3, cross, dot, grey
+from sightray.shapes.base import Shape, Surface, intersect, occluded, rise, surface
 
 _SLIVER = 1e-15  # twice the area over the longest edge squared, up to which three corners count as on one line
 
@@ -151,3 +151,25 @@ def surface_of_mesh(mesh: Table, hit: Hit, p: Vec3) -> Surface:
         if det != 0.0:
             tangent = (e1 * dv2 - e2 * dv1) / det
     return Surface(n, shading, u, v, tangent)
+
+
+@implements(rise, Mesh)
+def rise_over_mesh(mesh: Table, hit: Hit, p: Vec3, side: f64) -> Vec3:
+    normals = table_at(mesh, NORMALS)
+    if is_null(normals):
+        return grey(0.0)
+    vertices, faces, first = table_at(mesh, VERTICES_GIVEN), table_at(mesh, FACES_GIVEN), 3 * hit.prim
+    i, j, k = int(i32_at(faces, first)), int(i32_at(faces, first + 1)), int(i32_at(faces, first + 2))
+    a = up_to_plane(p, vec3_of(vertices, i), vec3_of(normals, i) * side)
+    b = up_to_plane(p, vec3_of(vertices, j), vec3_of(normals, j) * side)
+    c = up_to_plane(p, vec3_of(vertices, k), vec3_of(normals, k) * side)
+    return a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
+
+
+@kernel
+def up_to_plane(p: Vec3, corner: Vec3, n: Vec3) -> Vec3:
+    """The way from p straight up to the plane through a corner with the normal n; none if p is above it."""
+    n2 = dot(n, n)
+    if not n2 > 0.0:
+        return grey(0.0)
+    return n * (max(0.0, dot(corner - p, n)) / n2)

@@ -66,4 +66,4 @@ def surface_of_sphere(sphere: Table, hit: Hit, p: Vec3) -> Surface:
     n = p - vec3_at(sphere, CENTER)
     u = math.atan2(-n.z, n.x) / (2.0 * math.pi)
     v = 0.5 + math.asin(min(1.0, max(-1.0, n.y / f64_at(sphere, RADIUS)))) / math.pi
-    return Surface(n, n, u - math.floor(u), v, Vec3(n.z, 0.0, -n.x))
+    return Surface(n, n, u - math.floor(u), v, Vec3(n.z, 0.0, -n.x) * (2.0 * math.pi))

@@ -121,7 +121,7 @@ def surface_of_tapered(body: Table, hit: Hit, p: Vec3) -> Surface:
     q = transform_normal(body, AXES, p - vec3_at(body, MIDDLE))
     rho = math.sqrt(q.x * q.x + q.y * q.y)
     k, h, r = f64_at(body, GROWTH), f64_at(body, HEIGHT), f64_at(body, MEAN_RADIUS)
-    around = Vec3(-q.y, q.x, 0.0) if rho > 0.0 else Vec3(0.0, 1.0, 0.0)
+    around = Vec3(-q.y, q.x, 0.0) * (2.0 * math.pi) if rho > 0.0 else Vec3(0.0, 1.0, 0.0)
     if hit.prim == SIDE:
         v = q.z / h + 0.5
         n = Vec3(q.x, q.y, -k * rho) if rho > 0.0 else Vec3(0.0, 0.0, -k)  # an apex looks along the axis

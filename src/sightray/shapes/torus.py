@@ -122,4 +122,5 @@ def surface_of_torus(torus: Table, hit: Hit, p: Vec3) -> Surface:
     rho = math.sqrt(q.x * q.x + q.y * q.y)
     out = rho - f64_at(torus, MAJOR)
     n = transform_vector(torus, AXES, Vec3(q.x * out / rho, q.y * out / rho, q.z))
-    return Surface(n, n, turn(q.x, q.y), turn(out, q.z), transform_vector(torus, AXES, Vec3(-q.y, q.x, 0.0)))
+    around = transform_vector(torus, AXES, Vec3(-q.y, q.x, 0.0) * (2.0 * math.pi))
+    return Surface(n, n, turn(q.x, q.y), turn(out, q.z), around)

@@ -21,12 +21,21 @@ class Where(NamedTuple):
     v: f64
     p: Vec3  # the point in the space of the shape, so that solid textures move with it
     normal: Vec3  # unit, outward, geometric, in the space of the shape
-    width: f64  # of the ray's footprint, in units of u; 0 for a ray without width
+    width: f64  # of the ray's footprint where it is longest, in units of u; 0 for a ray without width
     bands: Table  # what the lanes of colours stand for; null for RGB (see mathlib/bands.py)
 
 
 class Texture(Member, family="textures"):
     """Base of all textures."""
+
+    def as_numbers(self) -> Texture:
+        """The same texture for a field that wants plain numbers, not colours: PNG and JPEG files are read as they are.
+
+        Roughness, opacity, height and normal maps are such numbers; the sRGB curve of a picture file is for colours.
+        """
+        children = {name: value for name, value in self.values().items() if isinstance(value, Texture)}
+        numbers = {name: value.as_numbers() for name, value in children.items()}
+        return self.replace(**numbers) if any(numbers[name] is not children[name] for name in numbers) else self
 
 
 @method(0)
@@ -63,12 +72,14 @@ def anywhere(u: f64, v: f64, p: Vec3) -> Where:
 class Textured(Child):
     """A colour or a texture; kernels always see a texture."""
 
-    def __init__(self, doc: str, default: Any = REQUIRED, *, at_most: float = float("inf")):
-        super().__init__(doc, "textures", default)
+    def __init__(
+        self, doc: str, default: Any = REQUIRED, *, at_most: float = float("inf"), optional: bool = False
+    ):  # fmt: skip
+        super().__init__(doc, "textures", default, optional=optional)
         self._color = ColorField(doc, at_most=at_most)
 
     def convert(self, value: Any) -> Any:
-        if isinstance(value, Texture):
+        if isinstance(value, Texture) or (value is None and self.optional):
             return value
         if isinstance(value, Member):
             raise SceneError(f"got {value!r}; allowed: {self.allowed()}")
@@ -80,15 +91,18 @@ class Textured(Child):
     def pack(self, row: Table, word: int, value: Any, packer: Packer) -> None:
         from sightray.textures.constant import Constant
 
-        super().pack(row, word, value if isinstance(value, Texture) else Constant(color=value), packer)
+        known = value is None or isinstance(value, Texture)
+        super().pack(row, word, value if known else Constant(color=value), packer)
 
     def plain(self, value: Any) -> Any:
-        return value if isinstance(value, Texture) else self._color.plain(value)
+        return value if value is None or isinstance(value, Texture) else self._color.plain(value)
 
     def allowed(self) -> str:
-        return f"{self._color.allowed()}, or a texture"
+        return f"{self._color.allowed()}, or a texture" + (", or None" if self.optional else "")
 
 
-def textured(doc: str, default: Any = REQUIRED, *, at_most: float = float("inf")) -> Any:
+def textured(
+    doc: str, default: Any = REQUIRED, *, at_most: float = float("inf"), optional: bool = False
+) -> Any:  # fmt: skip
     """A linear colour, or a texture that gives one."""
-    return Textured(doc, default, at_most=at_most)
+    return Textured(doc, default, at_most=at_most, optional=optional)

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from sightray._jit import implements
+from sightray._jit import implements, kernel
 from sightray.fields import choice, number
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at
 from sightray.mathlib.vec import Vec3
-from sightray.textures.base import Texture, Where, texture_value, textured
+from sightray.textures.base import Texture, Where, texture_spectrum, texture_value, textured
 
 UV, SOLID = 0, 1
 NUDGE = 1e-6  # of a cell: a floor at y = 0 lies on a boundary of solid cells, where rounding would choose its colour
@@ -36,14 +36,23 @@ class Checker(Texture):
 EVEN, ODD, SCALE, MODE = Checker.offsets()
 
 
-@implements(texture_value, Checker)
-def value_of_checker(texture: Table, where: Where) -> Vec3:
+@kernel
+def cell_of(texture: Table, where: Where) -> Table:
+    """The texture of the cell that a place is in."""
     s = f64_at(texture, SCALE)
     cells = np.floor(where.u * s + NUDGE) + np.floor(where.v * s + NUDGE)
     if i64_at(texture, MODE) == SOLID:
         cells = np.floor(where.p.x * s + NUDGE) + np.floor(where.p.y * s + NUDGE) + np.floor(where.p.z * s + NUDGE)
     # Stay in floating point, so that far away no integer overflows.
     half: f64 = 0.5 * cells
-    if half == np.floor(half):
-        return texture_value(table_at(texture, EVEN), where)
-    return texture_value(table_at(texture, ODD), where)
+    return table_at(texture, EVEN if half == np.floor(half) else ODD)
+
+
+@implements(texture_value, Checker)
+def value_of_checker(texture: Table, where: Where) -> Vec3:
+    return texture_value(cell_of(texture, where), where)
+
+
+@implements(texture_spectrum, Checker)
+def spectrum_of_checker(texture: Table, where: Where) -> Vec3:
+    return texture_spectrum(cell_of(texture, where), where)

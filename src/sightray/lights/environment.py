@@ -1,0 +1,173 @@
+"""Light from all around: a picture of the whole sky, or the same from everywhere."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sightray._jit import implements, kernel
+from sightray.errors import SceneError
+from sightray.fields import Color, color, derived_array, derived_integer, derived_vector, integer, other
+from sightray.lights.area import MAX_GRID, place_in_cells
+from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, sky
+from sightray.lights.picture import LUMINANCE, picture, pixel_at, radiant_pixels
+from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, i64_at, table_at, vec3_at
+from sightray.mathlib.transform import Transform, as_transform
+from sightray.mathlib.vec import Vec3, dot, grey
+
+TURNED = 1e-6  # how far the axes may be from orthonormal
+
+
+def _rotation(value: Any) -> Transform:
+    """A map that turns and does nothing else to directions, or a `SceneError`."""
+    turn = as_transform(value)
+    axes = turn.matrix[:3, :3]
+    if np.abs(axes.T @ axes - np.eye(3)).max() > TURNED:
+        raise SceneError("the axes are not orthonormal; allowed: a rotation")
+    return turn
+
+
+class EnvironmentLight(Light):
+    """Light from infinitely far away: `radiance` times a picture of all directions, or `radiance` alone.
+
+    The picture is in the lat-long (equirectangular) projection: rows are even in the angle from +y, which is the top
+    row, to -y; columns run once around. The middle column looks along -z, and columns further to the right turn to +x:
+    what a camera that stands upright and looks along -z sees in front of it. With theta the angle from +y and W x H
+    pixels, the direction (x, y, z) is looked up at
+
+        column = W (1/2 + atan2(x, -z) / 2 pi),  row = H theta / pi,
+
+    between the centres of the four nearest pixels. `transform` turns it: ``Transform.rotate((0, 1, 0), 90)`` moves the
+    middle from -z to -x. A translation has no effect.
+
+    Directions are chosen in proportion to luminance times solid angle, pixel by pixel. A pixel's luminance is the mean
+    over its area of what the lookup between pixels gives, which is (1, 6, 1)/8 of it and its neighbours along either
+    axis, so that no light is left out. The picture takes 20 bytes a pixel. `grid` cells divide the picture's light,
+    not its area.
+
+    Reference: M. Pharr, W. Jakob, G. Humphreys, Physically Based Rendering, 4th ed. 2023, section 12.5.
+    """
+
+    image: Any = picture(default=None)
+    radiance: Color = color("radiance of the sky, or what the picture is multiplied by", default=1.0, unit="W/(m² sr)")
+    transform: Transform = other("a rotation, world from picture", _rotation, default=None,
+                                 plain=lambda t: None if t.is_identity else t.matrix.tolist())  # fmt: skip
+    grid: int = integer("grid x grid shadow rays", default=4, at_least=1, at_most=MAX_GRID)
+    _x: Any = derived_vector("world x of the picture's axes", lambda e: e.transform.matrix[0, :3])
+    _y: Any = derived_vector("world y of the picture's axes", lambda e: e.transform.matrix[1, :3])
+    _z: Any = derived_vector("world z of the picture's axes", lambda e: e.transform.matrix[2, :3])
+    _width: Any = derived_integer("columns", lambda e: e.pixels.shape[1])
+    _height: Any = derived_integer("rows", lambda e: e.pixels.shape[0])
+    _pixels: Any = derived_array("colours, three floats each", lambda e: e.pixels)
+    _sums: Any = derived_array("cumulated weights of the pixels", lambda e: cumulated(e.weights()))
+
+    @property
+    def infinite(self) -> bool:
+        return True
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """The picture, (h, w, 3) float32, linear, read-only; one white pixel if there is none."""
+        return self.__dict__["_picture"]
+
+    def check(self) -> None:
+        """Read the file once, so that a missing one is an error where the light is stated."""
+        white = np.ones((1, 1, 3), np.float32)
+        found = white if self.image is None else radiant_pixels(self.image, "EnvironmentLight")
+        object.__setattr__(self, "_picture", found)
+
+    def weights(self) -> np.ndarray:
+        """What the pixels weigh among each other: mean luminance times solid angle, (h, w) float64."""
+        bright = self.pixels.astype(np.float64) @ LUMINANCE
+        bright = 0.75 * bright + 0.125 * (np.roll(bright, 1, axis=1) + np.roll(bright, -1, axis=1))
+        above, below = np.vstack([bright[:1], bright[:-1]]), np.vstack([bright[1:], bright[-1:]])
+        bright = 0.75 * bright + 0.125 * (above + below)
+        edges = np.cos(np.linspace(0.0, math.pi, len(bright) + 1))
+        return bright * (edges[:-1] - edges[1:])[:, None]
+
+
+RADIANCE, GRID, X, Y, Z, WIDTH, HEIGHT, PIXELS, SUMS = EnvironmentLight.offsets()
+
+
+@implements(cells, EnvironmentLight)
+def cells_of_environment(light: Table) -> i64:
+    return i64_at(light, GRID) * i64_at(light, GRID)
+
+
+@kernel
+def into_picture(light: Table, d: Vec3) -> Vec3:
+    """A world direction in the axes of the picture."""
+    return vec3_at(light, X) * d.x + vec3_at(light, Y) * d.y + vec3_at(light, Z) * d.z
+
+
+@kernel
+def out_of_picture(light: Table, d: Vec3) -> Vec3:
+    """A direction in the axes of the picture, in the world."""
+    return Vec3(dot(vec3_at(light, X), d), dot(vec3_at(light, Y), d), dot(vec3_at(light, Z), d))
+
+
+@kernel
+def column_of(d: Vec3, w: i64) -> f64:
+    """Where a direction stands along a row, 0 to w."""
+    return w * (0.5 + math.atan2(d.x, -d.z) / (2.0 * math.pi))
+
+
+@kernel
+def row_of(d: Vec3, h: i64) -> f64:
+    """Where a direction stands along a column, 0 to h."""
+    return h * math.atan2(math.sqrt(d.x * d.x + d.z * d.z), d.y) / math.pi
+
+
+@kernel
+def solid_angle_of(row: i64, w: i64, h: i64) -> f64:
+    """Solid angle of a pixel."""
+    return 2.0 * math.pi / w * (math.cos(math.pi * row / h) - math.cos(math.pi * (row + 1) / h))
+
+
+@kernel
+def looked_up(light: Table, d: Vec3) -> Vec3:
+    """Radiance that comes from a direction of the picture."""
+    w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
+    x, y = column_of(d, w) - 0.5, row_of(d, h) - 0.5
+    left, top = math.floor(x), math.floor(y)
+    s, t = x - left, y - top
+    column, row = int(left) % w, min(max(int(top), 0), h - 1)
+    following, below = (column + 1) % w, min(max(int(top) + 1, 0), h - 1)
+    pixels = table_at(light, PIXELS)
+    upper = pixel_at(pixels, w, column, row) * (1.0 - s) + pixel_at(pixels, w, following, row) * s
+    lower = pixel_at(pixels, w, column, below) * (1.0 - s) + pixel_at(pixels, w, following, below) * s
+    return vec3_at(light, RADIANCE) * (upper * (1.0 - t) + lower * t)
+
+
+@implements(sky, EnvironmentLight)
+def sky_of_environment(light: Table, d: Vec3) -> Vec3:
+    return looked_up(light, into_picture(light, d))
+
+
+@implements(illuminate, EnvironmentLight)
+def illuminate_from_environment(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
+    # Draw a pixel, and a direction in it that is even in solid angle.
+    w, h, n = i64_at(light, WIDTH), i64_at(light, HEIGHT), i64_at(light, GRID)
+    place = place_in_cells(n, cell, u, v)
+    drawn = draw_cell(table_at(light, SUMS), w, h, place.x, place.y)
+    upper, lower = math.cos(math.pi * drawn.row / h), math.cos(math.pi * (drawn.row + 1) / h)
+    cosine = upper + (lower - upper) * drawn.v
+    sine = math.sqrt(max(0.0, 1.0 - cosine * cosine))
+    phi = 2.0 * math.pi * ((drawn.column + drawn.u) / w - 0.5)
+    d = Vec3(sine * math.sin(phi), cosine, -sine * math.cos(phi))
+    if not drawn.probability > 0.0:
+        return LightSample(out_of_picture(light, d), math.inf, grey(0.0))
+    share = solid_angle_of(drawn.row, w, h) / (drawn.probability * n * n)
+    return LightSample(out_of_picture(light, d), math.inf, looked_up(light, d) * share)
+
+
+@implements(direction_density, EnvironmentLight)
+def density_of_environment(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    d = into_picture(light, l)
+    w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
+    row, column = min(int(row_of(d, h)), h - 1), min(int(column_of(d, w)), w - 1)
+    return cell_probability(table_at(light, SUMS), w, h, row, column) / solid_angle_of(row, w, h)

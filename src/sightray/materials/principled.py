@@ -1,0 +1,232 @@
+"""One material with many parameters, as in glTF: plastic, metal, varnish, cloth, frosted glass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sightray._jit import implements, kernel
+from sightray.fields import (
+    Color,
+    child,
+    color,
+    derived_array,
+    derived_child,
+    derived_number,
+    derived_vector,
+    flag,
+    number,
+)
+from sightray.materials.base import (
+    BsdfSample,
+    BsdfValue,
+    Local,
+    Material,
+    bsdf,
+    emitted,
+    interior,
+    local,
+    sample_bsdf,
+)  # fmt: skip
+from sightray.materials.body import check_body, medium_inside, stain
+from sightray.materials.data import data, share_of
+from sightray.materials.dielectric import Boundary, boundary_of
+from sightray.materials.energy import missing_of_glass, missing_of_mirrors, passing, reflected_by_glass
+from sightray.materials.gloss import glossy, softened
+from sightray.materials.layers import COAT_INDEX, Layers, layers_value, sample_layers, schlick
+from sightray.materials.microfacet import GGX, facets
+from sightray.materials.sheen import sheen_table
+from sightray.mathlib.frame import fresnel
+from sightray.mathlib.scalars import f64
+from sightray.mathlib.table import Table, f64_at, i64_at, is_null, table_at, vec3_at
+from sightray.mathlib.vec import Vec3, grey, max4
+from sightray.textures.base import Where, texture_value, textured, value_at
+
+
+class Principled(Material):
+    """Metallic-roughness shading as in glTF 2.0, with its extensions for coats, sheen and transmission.
+
+    From below to the top:
+
+    - a **base**: `metallic` of it is metal, GGX facets with Schlick's reflectance from `base_color` head-on to white;
+      the rest is a dielectric of index `ior` that reflects colourlessly, `specular` times as much as Fresnel says, and
+      below that `transmission` of it is clear, the others matte, both of `base_color`. All have the same `roughness`.
+    - a **sheen** of fibres of the colour `sheen` (`sheen.py`);
+    - a **clear coat**, `clearcoat` times a varnish of index 1.5 with its own roughness.
+
+    Each layer dims what is below it by what it reflects itself of viewer or light, whichever is more. Light that single
+    reflections between facets lose comes back, so that a white base reflects all it gets (`energy.py`), and nothing ever
+    reflects more. Facets have alpha = roughness², at least 0.001.
+
+    What is clear bounds a closed body that bends light and is filled as in `Glass`; with `thin_walled` it is a sheet
+    that light passes straight, blurred by the roughness. Sheen and coat lie on both sides; opaque parts look the same
+    from both sides.
+
+    References: Khronos Group, glTF 2.0, appendix B, and KHR_materials_{ior, specular, clearcoat, sheen, transmission,
+    volume}; B. Burley, "Physically based shading at Disney", SIGGRAPH 2012 course.
+    """
+
+    base_color: Any = textured("colour of metal, of matte, and of what light takes on when it passes", default=0.8,
+                               at_most=1.0)  # fmt: skip
+    metallic: Any = data("share of metal", default=0.0)
+    roughness: Any = data("perceived roughness of the base", default=0.5)
+    ior: float = number("refractive index of the dielectric", default=1.5, at_least=1)
+    specular: Any = data("factor on what the opaque dielectric reflects colourlessly", default=1.0)
+    clearcoat: Any = data("strength of the clear coat", default=0.0)
+    clearcoat_roughness: Any = data("its perceived roughness", default=0.0)
+    sheen: Any = textured("colour of the sheen", default=0.0, at_most=1.0)
+    sheen_roughness: Any = data("its perceived roughness", default=0.3)
+    transmission: Any = data("share of the dielectric that is clear below its surface", default=0.0)
+    thin_walled: bool = flag("whether what is clear is a sheet, and not the boundary of a body", default=False)
+    absorption: Color = color("absorption coefficient of the inside", default=0.0, unit="1/m")
+    interior: Any = child("the medium inside; None for a clear or absorbing one", "media", default=None, optional=True,
+                          packed=False)  # fmt: skip
+    emission: Any = textured("radiance that the surface gives off by itself", default=0.0)
+    _inside: Any = derived_child("the medium inside, if there is one", lambda p: p.inside())
+    _stain: Any = derived_vector("its absorption as Whitted's model sees it",
+                                 lambda p: stain(p) if p.inside() else (0.0,) * 3)  # fmt: skip
+    _metal: Any = derived_array("energy that single reflections of metal lose", lambda p: missing_of_mirrors(GGX))
+    _varnish: Any = derived_array("what the dielectric reflects", lambda p: reflected_by_glass(GGX, 1.0 / p.ior))
+    _coat: Any = derived_array("what the coat reflects", lambda p: p.coat())
+    _sheen: Any = derived_array("what the sheen reflects", lambda p: sheen_table() if _there(p.sheen) else None)
+    _glass_out: Any = derived_array("energy that single passages lose, from outside", lambda p: p.missing(1.0 / p.ior))
+    _glass_in: Any = derived_array("and from inside", lambda p: p.missing(p.ior))
+    _enters: Any = derived_number("share of light from all sides that enters",
+                                  lambda p: passing(p.ior)[0])  # fmt: skip
+    _leaves: Any = derived_number("and that leaves", lambda p: passing(p.ior)[1])
+
+    def check(self) -> None:
+        """Refuse absorption beside a medium."""
+        check_body(self)
+
+    @property
+    def translucent(self) -> bool:
+        return _there(self.transmission)
+
+    @property
+    def thin(self) -> bool:
+        return self.thin_walled
+
+    @property
+    def glow(self) -> float:
+        if not isinstance(self.emission, tuple):
+            return 1.0
+        return sum(self.emission) / 3
+
+    def inside(self) -> Any:
+        """The medium inside, or None; sheets have none, and neither have opaque bodies."""
+        return None if self.thin_walled or not _there(self.transmission) else medium_inside(self)
+
+    def coat(self) -> Any:
+        """The table of energy.py for the clear coat, if there is one."""
+        return reflected_by_glass(GGX, 1.0 / COAT_INDEX) if _there(self.clearcoat) else None
+
+    def missing(self, eta: float) -> Any:
+        """The table of energy.py for one side of what is clear, if anything is."""
+        return missing_of_glass(GGX, eta) if _there(self.transmission) and not self.thin_walled else None
+
+
+def _there(value: Any) -> bool:
+    """Whether a colour or texture can be other than black."""
+    return not isinstance(value, tuple) or bool(np.any(value))
+
+
+(
+    BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR, CLEARCOAT, CLEARCOAT_ROUGHNESS, SHEEN, SHEEN_ROUGHNESS,
+    TRANSMISSION, THIN_WALLED, ABSORPTION, EMISSION, INSIDE, STAIN, METAL_TABLE, VARNISH_TABLE, COAT_TABLE, SHEEN_TABLE,
+    GLASS_OUT, GLASS_IN, ENTERS, LEAVES,
+) = Principled.offsets()  # fmt: skip
+SMOOTHEST = 0.0316  # roughness, for an alpha of 0.001: like a mirror, but lights without extent show in it
+
+
+@kernel
+def boundary_seen(material: Table, roughness: f64, outside: bool) -> Boundary:
+    """The boundary of a clear body from the viewer's side; for others, one that is never asked."""
+    out, within = table_at(material, GLASS_OUT), table_at(material, GLASS_IN)
+    shape, ior = facets(GGX, roughness, 0.0), f64_at(material, IOR)
+    if is_null(out):
+        return Boundary(shape, roughness, 1.0 / ior, out, within, 0.0)
+    if outside:
+        return boundary_of(shape, roughness, 1.0 / ior, out, within, f64_at(material, ENTERS))
+    return boundary_of(shape, roughness, ior, within, out, f64_at(material, LEAVES))
+
+
+@kernel
+def layers_of(material: Table, where: Where, outside: bool) -> Layers:
+    """All parameters at a place, from the viewer's side."""
+    roughness = max(SMOOTHEST, share_of(table_at(material, ROUGHNESS), where))
+    dielectric = 1.0 - share_of(table_at(material, METALLIC), where)
+    clear = dielectric * share_of(table_at(material, TRANSMISSION), where)
+    coat, fibres = table_at(material, COAT_TABLE), table_at(material, SHEEN_TABLE)
+    return Layers(
+        value_at(table_at(material, BASE_COLOR), where),
+        1.0 - dielectric,
+        dielectric - clear,
+        clear,
+        share_of(table_at(material, SPECULAR), where),
+        1.0 / f64_at(material, IOR),
+        boundary_seen(material, roughness, outside),
+        i64_at(material, THIN_WALLED) != 0,
+        1.0 - f64_at(material, ENTERS),
+        0.0 if is_null(coat) else share_of(table_at(material, CLEARCOAT), where),
+        max(SMOOTHEST, share_of(table_at(material, CLEARCOAT_ROUGHNESS), where)),
+        grey(0.0) if is_null(fibres) else value_at(table_at(material, SHEEN), where),
+        share_of(table_at(material, SHEEN_ROUGHNESS), where),
+        table_at(material, METAL_TABLE),
+        table_at(material, VARNISH_TABLE),
+        coat,
+        fibres,
+    )
+
+
+@implements(sample_bsdf, Principled)
+def sample_principled(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
+    side = 1.0 if wo.z > 0.0 else -1.0
+    layers = layers_of(material, where, wo.z > 0.0)
+    o = Vec3(wo.x, wo.y, wo.z * side)
+    i = sample_layers(layers, o, u, v, choice)
+    if i.z == 0.0:
+        return BsdfSample(wo, grey(0.0), 0.0)
+    found = layers_value(layers, where.bands, o, i)
+    if not found.density > 0.0:  # seen exactly along the surface
+        return BsdfSample(wo, grey(0.0), 0.0)
+    return BsdfSample(Vec3(i.x, i.y, i.z * side), found.value / found.density, found.density)
+
+
+@implements(bsdf, Principled)
+def bsdf_of_principled(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValue:
+    if wo.z == 0.0 or wi.z == 0.0:
+        return BsdfValue(grey(0.0), 0.0)
+    side = 1.0 if wo.z > 0.0 else -1.0
+    layers = layers_of(material, where, wo.z > 0.0)
+    return layers_value(layers, where.bands, Vec3(wo.x, wo.y, wo.z * side), Vec3(wi.x, wi.y, wi.z * side))
+
+
+@implements(local, Principled)
+def local_of_principled(material: Table, where: Where, cos_view: f64) -> Local:
+    """Metal and the surface of the dielectric are mirrors, the coat is one more; sheen counts as matte."""
+    outside = cos_view >= 0.0
+    x = layers_of(material, where, outside)
+    eta, alpha = 1.0 if x.thin else x.boundary.eta, x.boundary.shape.x
+    cosine = softened(cos_view, alpha)
+    share = fresnel(cosine, x.boundary.eta)
+    varnish = x.specular * fresnel(cosine, x.eta)
+    coat = x.coat * fresnel(abs(cos_view), 1.0 / COAT_INDEX)
+    below = (1.0 - coat) * (1.0 - max4(x.sheen))
+    mirror = (schlick(x.base, cosine) * x.metal + (varnish * x.opaque + share * x.clear)) * below + coat
+    matte = x.base * (x.opaque * (1.0 - varnish) * below) + x.sheen * (1.0 - coat)
+    absorption = grey(0.0) if outside else vec3_at(material, STAIN)
+    emission = emitted_by_principled(material, where, cos_view)
+    passed = x.base * (x.clear * (1.0 - share) * below)
+    return glossy(x.base, emission, matte, mirror, passed, alpha, eta, absorption)
+
+
+@implements(emitted, Principled)
+def emitted_by_principled(material: Table, where: Where, cos_view: f64) -> Vec3:
+    return texture_value(table_at(material, EMISSION), where)
+
+
+@implements(interior, Principled)
+def interior_of_principled(material: Table) -> Table:
+    return table_at(material, INSIDE)

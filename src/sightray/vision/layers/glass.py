@@ -1,0 +1,31 @@
+"""Glass mask."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sightray._jit import implements
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Table, i32_put, i64_at
+from sightray.mathlib.vec import max3
+from sightray.vision.layers.base import Layer, fill
+from sightray.vision.lighting import seen_at
+from sightray.vision.record import PIXEL, is_met, record_at
+
+
+class GlassLayer(Layer):
+    """1 where light passes through the surface, 0 elsewhere."""
+
+    label, dtype, background, picture, letters = "glass", np.int32, 0, "mask", "Y"
+
+
+@implements(fill, GlassLayer)
+def fill_glass(layer: Table, frame: Table, records: Table, count: i64, out: Table) -> None:
+    for i in range(count):
+        record = record_at(records, i)
+        found = 0
+        if is_met(record):
+            terms = seen_at(frame, record).terms
+            if max3(terms.transmission) > 0.0:
+                found = 1
+        i32_put(out, i64_at(record, PIXEL), found)

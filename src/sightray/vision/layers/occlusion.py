@@ -1,0 +1,42 @@
+"""Occlusion in another picture."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from sightray.vision.layers.base import Layer
+
+
+class _Occlusion(Layer):
+    """What occlusion masks have in common: a ray is cast to the point from the other camera; depths are not compared."""
+
+    picture, columns, letters = "mask", 1, "Y"
+    toward: ClassVar[str] = "next"
+    flow_layer: ClassVar[str] = "flow"
+
+    def needs(self, frame: Any) -> tuple[str, ...]:
+        return (self.flow_layer, f"{self.toward}_position")
+
+    def compute(self, frame: Any) -> np.ndarray:
+        other = frame.other(self.toward)
+        points = frame.values[f"{self.toward}_position"].reshape(-1, 3)
+        y, x = np.indices((frame.height, frame.width))
+        pixels = (frame.values[self.flow_layer] + np.stack([x, y], axis=-1) + 0.5).reshape(-1, 2)
+        within = other.within(pixels)
+        hidden = np.zeros(len(points), bool)
+        hidden[within] = ~other.sees(points[within], pixels[within], frame.threads)
+        return hidden.reshape(frame.height, frame.width)
+
+
+class OcclusionLayer(_Occlusion):
+    """Whether the point that is seen is hidden in the picture `next`, though within its borders; by casting a ray."""
+
+    label = "occlusion"
+
+
+class BackwardOcclusionLayer(_Occlusion):
+    """Whether the point that is seen is hidden in the picture `previous`, though within its borders; by casting a ray."""
+
+    label, toward, flow_layer = "backward_occlusion", "previous", "backward_flow"

@@ -1,0 +1,30 @@
+"""Shading normal, in the world."""
+
+from __future__ import annotations
+
+import math
+
+from sightray._jit import implements
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Table, i64_at, vec3_at
+from sightray.mathlib.vec import Vec3
+from sightray.scene.query_kernels import put_triple
+from sightray.vision.layers.base import Layer, fill
+from sightray.vision.record import PIXEL, SHADING, SURFACE, is_met, record_at
+
+
+class ShadingNormalLayer(Layer):
+    """Normal that lighting uses, interpolated on meshes that have normals: unit length, in the world."""
+
+    label, frame, columns, picture, letters = "shading_normal", "world", 3, "direction", "XYZ"
+    detail = SURFACE
+
+
+@implements(fill, ShadingNormalLayer)
+def fill_shading_normal(layer: Table, frame: Table, records: Table, count: i64, out: Table) -> None:
+    for i in range(count):
+        record = record_at(records, i)
+        n = Vec3(math.nan, math.nan, math.nan)
+        if is_met(record):
+            n = vec3_at(record, SHADING)
+        put_triple(out, i64_at(record, PIXEL), n)

@@ -1,0 +1,33 @@
+"""Shading normal, in the camera's frame."""
+
+from __future__ import annotations
+
+import math
+
+from sightray._jit import implements
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import Table, i64_at, vec3_at
+from sightray.mathlib.transform import transform_vector
+from sightray.mathlib.vec import Vec3
+from sightray.scene.query_kernels import put_triple
+from sightray.vision.layers.base import Layer, fill
+from sightray.vision.record import CAMERA_FROM_WORLD, PIXEL, SHADING, SURFACE, is_met, record_at
+
+
+class ShadingNormalCameraLayer(Layer):
+    """Normal that lighting uses, interpolated on meshes that have normals: unit length,
+    in the camera's frame (x right, y down, z forward).
+    """
+
+    label, frame, columns, picture, letters = "shading_normal_camera", "camera", 3, "direction", "XYZ"
+    detail = SURFACE
+
+
+@implements(fill, ShadingNormalCameraLayer)
+def fill_shading_normal_camera(layer: Table, frame: Table, records: Table, count: i64, out: Table) -> None:
+    for i in range(count):
+        record = record_at(records, i)
+        n = Vec3(math.nan, math.nan, math.nan)
+        if is_met(record):
+            n = transform_vector(frame, CAMERA_FROM_WORLD, vec3_at(record, SHADING))
+        put_triple(out, i64_at(record, PIXEL), n)

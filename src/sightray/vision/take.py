@@ -1,0 +1,43 @@
+"""A `Take`: one moment of a dataset before it is photographed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sightray.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """The scenes and cameras of one frame.
+
+    Parameters
+    ----------
+    frame, sequence, step, time : see `Shot`.
+    scene : what there is.
+    cameras : by name.
+    following, later : the scene and the cameras of the next moment, for flow; None if there is none.
+    blurred : by camera, what the shutter sees: scenes in motion with cameras in motion; None for pictures of an instant.
+    stereo : whether there are two cameras, a rectified pair.
+    classes : names of classes by names of objects, for `label`; they also number the classes.
+    targets : indices in ``scene.objects`` of what the dataset is about; None for all that have an end.
+    seeds : of the random numbers of each camera's picture.
+    note : more about the frame, for its mark; ready for JSON.
+    """
+
+    frame: int
+    scene: Scene
+    cameras: Mapping[str, Any]
+    sequence: int = 0
+    step: int = 0
+    time: float = 0.0
+    following: Scene | None = None
+    later: Mapping[str, Any] | None = None
+    blurred: Mapping[str, Scene] | None = None
+    stereo: bool = False
+    classes: Mapping[str, str] | None = None
+    targets: tuple[int, ...] | None = None
+    seeds: tuple[int, ...] = (0,)
+    note: dict[str, Any] = field(default_factory=dict)

@@ -96,7 +96,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_meshes(folder)
     shutil.copy(HERE / "tabletop.yaml", folder)
-    root = sr.vision.make_dataset(folder / "tabletop.yaml", folder / "data", frames=COLUMNS * ROWS,
+    root = sr.vision.make_dataset(folder / "tabletop.yaml", folder / "data", frames=COLUMNS * ROWS, samples=16,
                                   formats=["bop", "coco", "exr"], progress=print)  # fmt: skip
     recipe = load_recipe(folder / "tabletop.yaml")
     tiles = [tile(root, recipe, k) for k in range(COLUMNS * ROWS)]

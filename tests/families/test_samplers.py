@@ -16,6 +16,8 @@ from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_put
 from sightray.registry import members
 from sightray.samplers.base import begin, default_sampler, nested, pair
+from sightray.samplers.blue_noise import quadrants
+from sightray.samplers.halton import radical_inverse
 from sightray.scene.compile import Tables
 
 NAMES = sorted(members("samplers"))
@@ -240,6 +242,27 @@ def test_blue_noise_errors_cancel_among_neighbours():
     assert error("SobolSampler", 4) / error("SobolSampler", 1) == pytest.approx(0.25, abs=0.05)
     assert error("BlueNoiseSampler", 4) / error("BlueNoiseSampler", 1) < 0.07
     assert error("BlueNoiseSampler", 1) == pytest.approx(error("SobolSampler", 1), rel=0.1)
+
+
+def test_halton_digits_are_scrambled_fairly():
+    """The first digits of two indices, base 5: all 20 pairs of different digits equally often over keys (χ²)."""
+    keys = np.random.default_rng(3).integers(-(1 << 63), (1 << 63) - 1, 4000).tolist()
+    first = np.array([[int(5 * radical_inverse(i, 5, key)) for i in (0, 3)] for key in keys])
+    found = np.bincount(first @ [5, 1], minlength=25).reshape(5, 5)
+    assert (np.diag(found) == 0).all()
+    assert stats.chisquare(found[~np.eye(5, dtype=bool)]).pvalue > 1e-4
+
+
+@pytest.mark.parametrize("level", [0, 3])
+def test_quadrants_come_in_every_order(level):
+    """All 24 orders of a quadrant's four parts, equally often over keys (χ²), at the lowest level and a higher one."""
+    keys = np.random.default_rng(4).integers(-(1 << 63), (1 << 63) - 1, 5000).tolist()
+    corners = [(x << level) + ((y << level) << 16) for y in (2, 3) for x in (4, 5)]
+    orders = np.array([[(quadrants(pixel, key) >> (2 * level)) & 3 for pixel in corners] for key in keys])
+    assert (np.sort(orders, axis=1) == np.arange(4)).all()
+    found = np.unique(orders, axis=0, return_counts=True)[1]
+    assert len(found) == 24
+    assert stats.chisquare(found).pvalue > 1e-4
 
 
 # --- digits --------------------------------------------------------------------------------------------------------

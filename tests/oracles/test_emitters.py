@@ -131,3 +131,11 @@ def test_whitted_takes_glow_as_before():
     scene = scene_with("mesh")
     image = np.asarray(sr.render(scene.replace(ambient=0.0), sr.Whitted(), samples=1))
     assert {tuple(x) for x in np.round(image.reshape(-1, 3), 6).tolist()} <= {(0, 0, 0), (3, 2, 1)}
+
+
+def test_a_sphere_that_glows_does_not_light_itself_from_within():
+    """Points of its own surface are not outside of it, however they were rounded: the furnace is without noise."""
+    camera = sr.PerspectiveCamera(eye=(0.3, -0.2, 0.1), target=(0, 1, 0.5), vfov=70, width=16, height=16)
+    scene = sr.Scene(sr.Sphere(material=sr.Lambert(albedo=0.5, emission=1)), camera=camera)
+    image = np.asarray(sr.render(scene, sr.PathTracer(max_depth=3), samples=16))
+    np.testing.assert_allclose(image, 1.875, rtol=1e-6)

@@ -15,7 +15,7 @@ from sightray.cameras.base import Ray
 from sightray.engine.adaptive import ErrorDriven, allotted, relative_error
 from sightray.engine.run import run
 from sightray.engine.schedule import Contrast, Uniform
-from sightray.film.film import Film, averaged
+from sightray.film.film import Film, add_sample, averaged
 from sightray.integrators.base import Integrator, Radiance, radiance
 from sightray.mathlib.table import Table
 from sightray.mathlib.vec import Vec3, grey
@@ -164,6 +164,18 @@ def test_adaptive_pictures_are_right():
     assert abs(wrong.sum()) < 4 * np.sqrt((error**2).sum())
     lit = error > 1e-6
     assert np.median(np.abs(wrong[lit]) / error[lit]) == pytest.approx(0.674, abs=0.1)
+
+
+def test_variance_is_that_of_the_samples():
+    """Of luminance, by the textbook; the standard error without a mark is its root over root n."""
+    film = Film(2, 1)
+    values = np.random.default_rng(5).uniform(0, 3, (7, 3))
+    for color in values:
+        add_sample(film.table, 1, Vec3(*color), 1.0)
+    expected = (values @ LUMINANCE).var(ddof=1)
+    assert film.variance()[0, 1] == pytest.approx(expected, rel=1e-12)
+    assert film.standard_error()[0, 1] == pytest.approx(math.sqrt(expected / 7), rel=1e-12)
+    assert film.luminance()[0].tolist() == pytest.approx([0, (values @ LUMINANCE).mean()])
 
 
 def test_standard_error_is_that_of_many_renders():

@@ -119,6 +119,17 @@ def test_spot_with_a_hard_edge():
 
 # --- lights with an area -------------------------------------------------------------------------------------------
 
+
+@pytest.mark.parametrize("grid", [1, 3])
+def test_a_near_panel_leaves_only_the_noise_of_the_receivers_cosine(grid):
+    """Solid angles in place of areas (Urena et al. 2013): ORACLES' square, seen from its middle at half its width."""
+    panel = RectangleLight(corner=(-1, 1, -1), edge_u=(2, 0, 0), edge_v=(0, 0, 2), grid=grid)
+    e = measured(panel, (0, 0, 0), trials=4000)
+    expected = lambert_polygon(np.array([(-1, 1, -1), (1, 1, -1), (1, 1, 1), (-1, 1, 1)], float), np.zeros(3), (0, 1, 0))
+    assert expected == pytest.approx(1.7408395027, abs=1e-9)
+    assert abs(e.mean() - expected) < 4 * e.std() / math.sqrt(len(e))
+    assert e.std() < 0.15 / grid * expected  # areas would give 0.50 for a single cell
+
 SQUARE = {"corner": (-1, 1, -1), "edge_u": (2, 0, 0), "edge_v": (0, 0, 2)}  # [-1, 1]² at y = 1, shines down
 CORNERS = np.array([(-1, 1, -1), (1, 1, -1), (1, 1, 1), (-1, 1, 1)], float)
 LAMBERT = [((0, -1, 0), 0.7522746885), ((1, -1, 0), 0.5666451120), ((0, 0, 0), 1.7408395027)]

@@ -214,7 +214,10 @@ def test_interrupted_by_the_keyboard(recipe, tmp_path):
     root = tmp_path / "d"
     command = [sys.executable, "-m", "sightray", "dataset", str(recipe), "-o", str(root), "--frames", "500",
                "--workers", "2"]  # fmt: skip
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # background jobs ignore it
+    )  # fmt: skip
     until(lambda: len(list(root.glob("frames/0*.json"))) >= 2, process)
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=60)
@@ -251,6 +254,7 @@ def test_sequences_in_stereo_have_flow_and_disparity(tmp_path):
 def test_motion_blur_is_in_the_picture_and_not_in_the_labels(tmp_path):
     """The shutter's mean over the pictures of many instants is the blurred picture; labels are those of the middle."""
     text = SEQUENCE.replace("sequence:", "exposure: 0.2\nsequence:").replace("speed: 40", "speed: 60")
+    text = text.replace("name: floor", "name: floor, material: {type: Lambert, albedo: {type: Checker, scale: 0.3}}")
     blurred = load_recipe(
         write_recipe(tmp_path, text.replace(", shake: {position: 0.002, degrees: 0.1, low: 0.5, high: 4}", ""))
     )

@@ -86,6 +86,16 @@ def test_rings_may_be_linked_without_touching_and_one_body_may_lie_in_another():
     assert overlap(outer, eye, ball, inside)
 
 
+def test_a_needle_through_a_board_is_seen_from_both_sides():
+    """No vertex of one lies in the other, and no edge of the board meets the needle."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    board, needle = Solid(hull_mesh(corners * (1, 0.05, 1))), Solid(hull_mesh(corners * (0.01, 1, 0.01)))
+    there = sr.Transform.translate(0.3, 0, 0.5).matrix
+    assert overlap(board, np.eye(4), needle, there)
+    assert overlap(needle, there, board, np.eye(4))
+    assert not overlap(board, np.eye(4), needle, sr.Transform.translate(0.3, 1.06, 0.5).matrix)
+
+
 def test_boxes_stand_for_shapes_that_are_no_meshes():
     ball = Solid(sr.Sphere(radius=1))
     assert overlap(ball, np.eye(4), ball, sr.Transform.translate(1.99, 0, 0).matrix)

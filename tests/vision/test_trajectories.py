@@ -31,6 +31,7 @@ def test_quaternions_agree_with_scipy():
     for r in [*Rotation.random(200, random_state=1), *half_turns, Rotation.identity()]:
         q = quaternion(r.as_matrix())
         truth = scipy_quaternion(r)
+        assert q[0] >= 0
         assert min(np.abs(q - truth).max(), np.abs(q + truth).max()) < 1e-14
         np.testing.assert_allclose(matrix(q), r.as_matrix(), atol=1e-14)
     for r in Rotation.random(50, random_state=2):

@@ -338,3 +338,15 @@ def test_e9_flow_of_a_still_scene_under_a_rolling_shutter_projects_to_the_row_th
     to = labels.position[met] - o
     along = (to * d).sum(-1)
     assert np.abs(to - along[:, None] * d).max() <= 1e-9
+
+
+def test_e9_labels_of_a_moving_camera_are_those_of_the_middle_of_the_exposure():
+    base = every_camera()["PerspectiveCamera"].replace(shutter_open=0.2, shutter_close=0.6)
+    poses = [(0.0, base.world_from_camera()), (1.0, aside(base, (0.6, 0.2, -0.3)).world_from_camera())]
+    camera = sr.MovingCamera(camera=base, poses=poses)
+    still = camera.replace(poses=[(0.0, camera.world_from_camera(0.4))])
+    moving, plain = (sr.label(scene(c), "ray_origin", "ray_direction", "depth", "instance") for c in (camera, still))
+    assert (moving.instance == plain.instance).all()
+    for name in ("ray_origin", "ray_direction", "depth"):
+        np.testing.assert_allclose(moving[name], plain[name], atol=1e-12, err_msg=name)
+    assert np.abs(moving.ray_origin - base.eye).max() > 0.2

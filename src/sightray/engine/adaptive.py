@@ -16,20 +16,22 @@ LEAST = 0.1  # of the mean demand: what no pixel's demand is below, for what its
 WINDOW = 2  # pixels to each side over which variances are averaged
 
 
-def relative_error(film: Film) -> float:
+def relative_error(film: Film, error: np.ndarray | None = None) -> float:
     """Relative standard error of a picture: infinite while a pixel has fewer than two samples.
+
+    `error` is what ``film.standard_error()`` gave, if that is at hand.
 
     The root of the mean over all pixels of ``s² / (l² + (0.1 m)²)``: s is the standard error of a pixel's luminance l,
     and m the mean luminance of the picture, which keeps black pixels from asking for exactness that nobody can see.
     """
-    return float(np.sqrt(relative_square(film).mean()))
+    return float(np.sqrt(relative_square(film, film.standard_error() if error is None else error).mean()))
 
 
-def relative_square(film: Film) -> np.ndarray:
+def relative_square(film: Film, error: np.ndarray) -> np.ndarray:
     """The square of each pixel's error over that of the luminance that it is compared with: (h, w) float64."""
     luminance = film.luminance()
     scale = luminance**2 + (DARK * luminance.mean()) ** 2
-    return film.standard_error() ** 2 / np.maximum(scale, 1e-300)
+    return error**2 / np.maximum(scale, 1e-300)
 
 
 class ErrorDriven(NamedTuple):
@@ -64,7 +66,7 @@ class ErrorDriven(NamedTuple):
 
 def root_of_demand(film: Film) -> np.ndarray:
     """What the number of samples of each pixel should be proportional to: (height, width) float64."""
-    demand = np.sqrt(averaged(relative_square(film) * np.maximum(film.counts(), 1), WINDOW))
+    demand = np.sqrt(averaged(relative_square(film, film.standard_error()) * np.maximum(film.counts(), 1), WINDOW))
     return np.maximum(demand, LEAST * demand.mean())
 
 

@@ -49,11 +49,11 @@ class Outcome(NamedTuple):
 
     def facts(self) -> dict[str, Any]:
         """What there is to say of it, as in `Image.info`."""
-        counts = self.film.counts()
+        counts, error = self.film.counts(), self.film.standard_error()
         return {
             "samples": float(counts.mean()), "rays": self.rays, "seconds": self.seconds, "stopped": self.stopped,
-            "complete": self.complete, "sample_count": counts, "standard_error": self.film.standard_error(),
-            "error": relative_error(self.film), "invalid_samples": self.film.invalid(),
+            "complete": self.complete, "sample_count": counts, "standard_error": error,
+            "error": relative_error(self.film, error), "invalid_samples": self.film.invalid(),
         }  # fmt: skip
 
 

@@ -83,6 +83,8 @@ class Film:
         n = np.maximum(self.pixels[..., COUNT], 1.0)
         variance = self.variance()
         moved = (self.pixels[..., COUNT] > self.marked[..., 1]) & (self.marked[..., 1] > 1) & np.isfinite(variance)
+        if not moved.any():
+            return np.sqrt(variance / n)
         then = np.where(moved, self.marked[..., 1], 1.0)
         expected = np.where(moved, variance, 0.0) * np.where(moved, 1 / then - 1 / n, 0.0)
         happened = np.where(moved, (self.luminance() - self.marked[..., 0]) ** 2, 0.0)

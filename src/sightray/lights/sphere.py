@@ -60,6 +60,12 @@ def cap_of(radius: f64, d: f64) -> f64:
     return sin2 / (1.0 + math.sqrt(max(0.0, 1.0 - sin2)))
 
 
+@kernel
+def is_outside(d: f64, radius: f64) -> bool:
+    """Whether a point at distance d from the centre is outside; points of the surface are not, however rounded."""
+    return d > radius * (1.0 + 1e-7)
+
+
 class Way(NamedTuple):
     """From a point to a sphere."""
 
@@ -86,7 +92,7 @@ def toward_sphere(p: Vec3, center: Vec3, radius: f64, u: f64, v: f64) -> Way:
     """A direction in the cone that a sphere fills, chosen evenly by two numbers in [0, 1)."""
     axis = center - p
     d = length(axis)
-    if not d > radius:
+    if not is_outside(d, radius):
         return Way(Vec3(0.0, 1.0, 0.0, 0.0), radius, 0.0)
     axis = axis / d
 
@@ -111,6 +117,6 @@ def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> 
 @implements(direction_density, SphereLight)
 def density_of_sphere(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
     d, radius = length(vec3_at(light, CENTER) - p), f64_at(light, RADIUS)
-    if i64_at(light, VISIBLE) == 0 or not d > radius:
+    if i64_at(light, VISIBLE) == 0 or not is_outside(d, radius):
         return 0.0
     return 1.0 / (2.0 * math.pi * cap_of(radius, d))

@@ -26,7 +26,7 @@ from sightray.lights.base import (
     polygon,
 )
 from sightray.lights.disk import concentric
-from sightray.lights.sphere import cap_of, toward_sphere
+from sightray.lights.sphere import cap_of, is_outside, toward_sphere
 from sightray.lights.window import Window, in_window, window_of
 from sightray.materials.base import emitted
 from sightray.mathlib.scalars import f64, i64
@@ -226,4 +226,4 @@ def illuminate_from_ball(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> Li
 @implements(direction_density, _Ball)
 def density_of_ball(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
     d, radius = length(vec3_at(light, CENTER) - p), f64_at(light, RADIUS)
-    return 1.0 / (2.0 * math.pi * cap_of(radius, d)) if d > radius else 0.0
+    return 1.0 / (2.0 * math.pi * cap_of(radius, d)) if is_outside(d, radius) else 0.0

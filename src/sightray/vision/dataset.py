@@ -92,6 +92,11 @@ def make_dataset(
     writers = [as_writer(one) for one in (recipe.formats if formats is None else formats)]
     root = check_folder(Path(folder))
     _check_recipe(recipe, writers)
+    strange = [type(writer).__name__ for writer in writers if not type(writer).__module__.startswith("sightray.")]
+    if workers > 1 and strange:
+        raise SceneError(
+            f"dataset: workers: got {workers} with {strange[0]}, which other processes do not know; allowed: 1"
+        )
     with _locked(root):
         _remove_strays(root)
         identity = _identity(recipe, writers, samples)

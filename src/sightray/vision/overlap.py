@@ -73,8 +73,9 @@ def overlap(a: Solid, world_from_a: np.ndarray, b: Solid, world_from_b: np.ndarr
         return False
     b_from_a = np.linalg.inv(world_from_b) @ world_from_a
     a_from_b = np.linalg.inv(b_from_a)
-    return _edge_meets(a, b_from_a, b) or _edge_meets(b, a_from_b, a) or _within(a, b_from_a, b) or (
-        _within(b, a_from_b, a))  # fmt: skip
+    if _edge_meets(a, b_from_a, b) or _edge_meets(b, a_from_b, a):
+        return True
+    return _within(a, b_from_a, b) or _within(b, a_from_b, a)
 
 
 def _boxes_meet(a: Solid, world_from_a: np.ndarray, b: Solid, world_from_b: np.ndarray) -> bool:

@@ -15,7 +15,7 @@
       background: {uniform: [0.1, 0.6]}
       objects:
         - {type: Plane, point: [0, 0, 0], normal: [0, 1, 0], name: floor}
-        - {type: SphereLight, center: {around: {distance: [2, 3], azimuth: [0, 360], elevation: [40, 80]}}, radius: 0.2,
+        - {type: PointLight, position: {around: {distance: [2, 3], azimuth: [0, 360], elevation: [40, 80]}},
            intensity: {log_uniform: [5, 40]}}
 
 Any value may be random: `vision.draws` lists how. docs/datasets.md explains all keys.

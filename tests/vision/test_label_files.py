@@ -66,6 +66,17 @@ def test_every_picture_has_the_size_of_the_labels_and_a_legend_below(labels):
             assert np.isfinite(np.asarray(full)).all(), name
 
 
+@pytest.mark.parametrize("size", [(1, 1), (5, 3), (8, 6), (20, 1)])
+def test_tiny_pictures_have_legends_too(size):
+    camera = sr.PerspectiveCamera(width=size[0], height=size[1])
+    names = ("depth", "normal", "instance", "position", "uv", "flow", "visible_boxes", "mirror", "surfaces", "coverage")
+    labels = sr.label(sr.Scene(BALL, camera=camera), *names, next=camera)
+    for name in names:
+        picture = labels.picture(name)
+        assert picture.width == size[0]
+        assert picture.height > size[1]
+
+
 def test_what_is_no_picture_says_so(labels):
     with pytest.raises(sr.SceneError, match="layer 'fundamental' is no picture"):
         labels.picture("fundamental")

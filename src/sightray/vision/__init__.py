@@ -21,9 +21,11 @@ _HOMES = {
     "Shot": "shot",
     "Still": "trajectory",
     "Trajectory": "trajectory",
+    "back_project": "back_projection",
     "load_recipe": "recipe",
     "make_dataset": "dataset",
     "posed": "rigs",
+    "shadow_mask": "shadows",
     "stereo_rig": "rigs",
     "write_shots": "marks",
 }

@@ -96,7 +96,8 @@ def text_width(text: str) -> int:
 
 
 def write(out: np.ndarray, text: str, x: int, y: int) -> None:
-    """Write a line of text with its top-left corner at x, y; what does not fit is cut off."""
+    """Write a line of text with its top-left corner at x, y, but not left of the border; what does not fit is cut off."""
+    x = max(x, 0)
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = out.shape[:2]

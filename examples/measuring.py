@@ -68,7 +68,7 @@ def reconstruction() -> Image.Image:
     found = sr.vision.back_project(pixels, camera, [mesh, FLOOR])
     for view, places in ((camera, pixels), (aside, aside.project(found.points))):
         scene = sr.Scene(mesh, FLOOR, sr.PointLight(position=(1, 5, 3), intensity=60), camera=view)
-        picture = Image.fromarray(sr.render(scene, samples=4).as_bytes())
+        picture = Image.fromarray(sr.render(scene, samples=4).to_bytes())
         draw = ImageDraw.Draw(picture)
         for (x, y), shape in zip(places, found.shape, strict=True):
             if shape == 0 and np.isfinite(x):

@@ -21,7 +21,7 @@ import numpy as np
 SCENES = ("cornell", "still-life", "teapot-under-sky", "thousand-lights")
 SIDE = 128  # height of the pictures, pixels
 SAMPLES = (8, 16, 32, 64)
-REFERENCE = 4096
+REFERENCE = 1024
 EPSILON = 0.01
 
 Render = Callable[[int, int], np.ndarray]  # samples and seed to a picture
@@ -76,12 +76,13 @@ def sightray_renderer(scene: Any, threads: int) -> Renderer:
 
 def mitsuba_renderer(scene: Any, threads: int) -> Renderer:
     """Mitsuba 3, compiling with LLVM, three colours."""
+    import drjit
     import mitsuba as mi
 
     from sightray.cli.mitsuba_scene import mitsuba_dict
 
     mi.set_variant("llvm_ad_rgb")
-    mi.Thread.set_thread_count(threads)
+    drjit.set_thread_count(threads)
     loaded = mi.load_dict(mitsuba_dict(scene, mi, depth_of(scene)))
     return Renderer(f"Mitsuba {mi.__version__}", lambda samples, seed: np.array(
         mi.render(loaded, spp=samples, seed=seed)))  # fmt: skip

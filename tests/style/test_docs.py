@@ -65,5 +65,8 @@ def test_links_and_pictures_exist(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_commands_name_scenes_that_exist(page):
-    for name in re.findall(r"sightray (?:render|explain) ([\w-]+)(?![\w.-])", page.read_text(encoding="utf-8")):
-        assert name == "SCENE" or name in scenes.names() or f"{name}." in page.read_text(encoding="utf-8"), name
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"sightray (?:render|explain) ([\w-]+)(?![\w./-])", text):
+        assert name == "SCENE" or name in scenes.names() or f"{name}." in text, name
+    for path in re.findall(r"sightray (?:render|explain) (examples/[\w./-]+)", text):
+        assert (ROOT / path).exists(), path

@@ -9,7 +9,6 @@ import sightray as sr
 from sightray.images import Image
 from sightray.vision import back_project
 
-cv2 = pytest.importorskip("cv2")
 pytestmark = pytest.mark.peers
 
 SQUARES, SQUARE, TEXELS = (7, 5), 0.1, 240  # metres, texels along a square
@@ -18,6 +17,8 @@ CAMERA = {"width": 1280, "height": 960, "fx": 1400.0}
 
 def make_board():
     """OpenCV's board, its plate in z = 0 around the origin with y up, and the corners between squares, (n, 3)."""
+    import cv2
+
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     board = cv2.aruco.CharucoBoard(SQUARES, SQUARE, 0.75 * SQUARE, dictionary)
     page = board.generateImage((SQUARES[0] * TEXELS, SQUARES[1] * TEXELS), marginSize=0) / 255.0
@@ -41,6 +42,8 @@ def test_corners_are_found_where_they_are(distance, lens):
 
     Bytes are linear in light: the curve of sRGB would widen what is bright.
     """
+    import cv2
+
     board, plate, corners = make_board()
     eye = distance * np.array([0.3, 0.2, 1.0]) / np.linalg.norm((0.3, 0.2, 1.0))
     pose = sr.PerspectiveCamera(eye=eye, target=(0.01, 0.02, 0)).world_from_camera()

@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 import sightray as sr
 from sightray._jit import kernel, native
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put, no_table, vec3_at, vec3_put
 from sightray.media.base import phase, sample_distance, sample_phase, transmittance
+from sightray.media.grid import density_at
 from sightray.media.henyey_greenstein import henyey_greenstein
 from sightray.registry import members
 from sightray.samplers.base import begin
@@ -32,6 +34,26 @@ MEDIA = {
     ],
 }  # fmt: skip
 EVERY = [pytest.param(m, id=f"{name}{k}") for name, some in MEDIA.items() for k, m in enumerate(some)]
+
+
+@kernel
+def ask_densities(medium: Table, places: Table, count: i64, found: Table) -> None:
+    for i in range(count):
+        f64_put(found, i, density_at(medium, vec3_at(places, 4 * i)))
+
+
+def test_densities_are_blended_between_the_centres():
+    """Against SciPy's interpolation on the same grid; beyond the outermost centres the border's value goes on."""
+    grid = MEDIA["GridMedium"][1]
+    size = np.array(CLOUD.shape[::-1])
+    places = np.zeros((500, 4))
+    places[:, :3] = np.random.default_rng(1).random((500, 3)) * size
+    tables, found = Tables(), np.zeros(500)
+    row = tables.row_of(grid)
+    tables.prepare(ask_densities)
+    native(ask_densities)(row, tables.space.array(places), 500, tables.space.array(found))
+    expected = map_coordinates(CLOUD, places[:, 2::-1].T - 0.5, order=1, mode="nearest")
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_every_medium_has_an_example():

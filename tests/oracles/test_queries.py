@@ -523,3 +523,16 @@ sr.explain(scene, pixel=(4, 4))
 assert scene.intersect((0, 0, 4), (0, 0, -1)).t == before == 3
 """
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.mark.parametrize("others", [0, 6])
+def test_holes_let_rays_through_however_many_items_there_are(others):
+    """Few items are asked in packets and many are not; both see what a picture shows."""
+    hole = sr.Cutout(material=sr.Lambert(), opacity=sr.Checker(even=1.0, odd=0.0, scale=2.0))
+    corners, uvs = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 0), (1, 0), (1, 1), (0, 1)]
+    sheet = sr.Mesh(vertices=corners, faces=[(0, 1, 2), (0, 2, 3)], uvs=uvs, material=hole)
+    scene = sr.Scene(sheet, *[sr.Sphere(center=(9 + k, 0, 0), radius=0.1) for k in range(others)])
+    o = np.random.default_rng(0).random((200, 3)) * (1, 1, 0) + (0, 0, 3)
+    there = (np.floor(o[:, 0] * 2) + np.floor(o[:, 1] * 2)) % 2 == 0
+    np.testing.assert_array_equal(np.isfinite(scene.intersect(o, (0, 0, -1)).t), there)
+    np.testing.assert_array_equal(scene.occluded(o, (0, 0, -1)), there)

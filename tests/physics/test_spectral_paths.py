@@ -28,7 +28,7 @@ def test_light_keeps_its_colour(background):
     scene = looking_at(sr.Sphere(center=(0, 50, 0)), background=background)
     mean, error = mean_and_error(scene, TRACER, 64)
     assert (np.abs(mean - background) < 4.5 * error + 1e-6).all()
-    assert error.max() < 0.02 * max(background)
+    assert error.max() < 0.003 * max(background)  # four wavelengths a path; one alone would be eight times as noisy
 
 
 @pytest.mark.parametrize("albedo", [(0.5, 0.5, 0.5), (0.9, 0.2, 0.1), (0.1, 0.3, 0.8)])

@@ -12,6 +12,7 @@ import numpy as np
 
 from sightray._jit import native
 from sightray.accelerators.bvh import pack_items
+from sightray.accelerators.item import CUTOUT
 from sightray.bvh.packets import ROOM_WORDS
 from sightray.errors import SceneError
 from sightray.mathlib.table import Table, aligned, table_at
@@ -23,7 +24,7 @@ from sightray.scene.layer_kernels import count_of_rays, layers_of_rays
 from sightray.scene.packet_kernels import FEW_ITEMS, any_of_few, closest_of_few
 from sightray.scene.parallel import run_chunks
 from sightray.scene.query_kernels import any_of_rays, closest_of_rays, describe_hits
-from sightray.scene.world import ITEMS
+from sightray.scene.world import FLAGS, ITEMS
 from sightray.shapes.mesh import Mesh
 
 PRECISIONS = ("exact", "fast")
@@ -39,7 +40,8 @@ class Asked:
         kinds = np.array([MESH if isinstance(item.shape, Mesh) else OTHER for item in items] or [OTHER], np.int32)
         self.kinds = self.compiled.tables.space.array(kinds)
         self.objects = np.array([item.object for item in items], np.int32)
-        self.packets = 0 < len(items) <= FEW_ITEMS and MESH in kinds
+        holes = self.world.view(np.int64)[FLAGS] & CUTOUT  # packets do not know that surfaces may have them
+        self.packets = 0 < len(items) <= FEW_ITEMS and MESH in kinds and not holes
         self._tree: Table | None = None
         self._kernels: dict[Callable, Callable] = {}
 

@@ -1,6 +1,7 @@
 """The tree over a scene's items: single precision finds whom to ask, and every item answers in double precision.
 
-Items without finite bounds, such as planes, are listed apart and asked first: what they answer shortens the ray.
+Items without finite bounds, such as planes, are listed apart and asked first: what they answer shortens the ray. Where
+there are but a few items, all stand in that list: asking them takes less time than bringing the ray to a tree.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ from sightray.mathlib.vec import Vec3
 ORDER = TREE_WORDS  # pointer to item numbers as 32-bit integers: leaves are ranges of these
 ITEMS = TREE_WORDS + 1  # pointer to the items' rows
 UNBOUNDED = TREE_WORDS + 2  # pointer to the numbers of the items outside the tree
-UNBOUNDED_COUNT = TREE_WORDS + 3
-ITEM_TREE_WORDS = TREE_WORDS + 4
+UNBOUNDED_COUNT, BOUNDED_COUNT = TREE_WORDS + 3, TREE_WORDS + 4
+ITEM_TREE_WORDS = TREE_WORDS + 5
+FEW = 3  # items for which no tree is walked
 
 
 class Bvh(Accelerator):
@@ -57,6 +59,8 @@ def pack_items(space: Space, items: Table, lower: np.ndarray, upper: np.ndarray)
     """The row of a tree over items with these bounds, each (n, 3) float64; those without bounds are infinite."""
     finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
     infinite = ~finite & (lower <= upper).all(axis=1)
+    if finite.sum() <= FEW:
+        finite, infinite = np.zeros_like(finite), finite | infinite
     bounded, unbounded = np.flatnonzero(finite).astype(np.int32), np.flatnonzero(infinite).astype(np.int32)
     # Bounds of moved shapes carry rounding errors of the size of their distance from the world's origin.
     error = 2.0**-48 * np.maximum(np.abs(lower[bounded]), np.abs(upper[bounded])).max(axis=1, initial=0.0)[:, None]
@@ -66,7 +70,7 @@ def pack_items(space: Space, items: Table, lower: np.ndarray, upper: np.ndarray)
     link(row, ORDER, space.array(bounded[tree.order]))
     link(row, ITEMS, items)
     link(row, UNBOUNDED, space.array(unbounded))
-    row.view(np.int64)[UNBOUNDED_COUNT] = len(unbounded)
+    row.view(np.int64)[[UNBOUNDED_COUNT, BOUNDED_COUNT]] = len(unbounded), len(bounded)
     return row
 
 
@@ -76,6 +80,8 @@ def closest_item(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> ItemH
     best = ItemHit(math.inf, -1, -1, 0.0, 0.0)
     for i in range(i64_at(tree, UNBOUNDED_COUNT)):
         best = nearer(tree, int_at(table_at(tree, UNBOUNDED), i), o, d, t_min, t_max, best)
+    if i64_at(tree, BOUNDED_COUNT) == 0:
+        return best
     unit = unit_ray(tree, o, d, t_min, min(t_max, best.t))
     reach = unit.reach
     if not reach >= 0.0:
@@ -116,6 +122,8 @@ def any_item(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
     for i in range(i64_at(tree, UNBOUNDED_COUNT)):
         if occluded_item(item_at(items, int_at(table_at(tree, UNBOUNDED), i)), o, d, t_min, t_max):
             return True
+    if i64_at(tree, BOUNDED_COUNT) == 0:
+        return False
     unit = unit_ray(tree, o, d, t_min, t_max)
     if not unit.reach >= 0.0:
         return False

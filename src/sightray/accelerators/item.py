@@ -25,7 +25,7 @@ MET = 7  # what rays meet: the shape, or the wrapper of what moves
 UNMOVED, PLACED, MOVING = 0, 1, 2  # MOVED: object space is world space; is not; and changes with time
 LIGHT_STEP = 6  # from the light that a primitive is to that of the next: 1 where each triangle is one, else 0
 # Bits of FLAGS: what the material is, see materials/base.py.
-CUTOUT, BUMPY, ORIENTED, CLEAR, THIN, TRANSLUCENT = 1, 2, 4, 8, 16, 32
+CUTOUT, BUMPY, ORIENTED, CLEAR, THIN, TRANSLUCENT, PATTERNED = 1, 2, 4, 8, 16, 32, 64
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
 ITEM_WORDS = 40
 

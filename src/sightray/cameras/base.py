@@ -14,13 +14,14 @@ import numpy as np
 
 from sightray._jit import implements, kernel, method
 from sightray.errors import SceneError
-from sightray.fields import derived_number, derived_vector, integer, number
+from sightray.fields import derived_integer, derived_number, derived_vector, integer, number
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, normalize
 from sightray.registry import Member
 
 MAX_SIDE = 65_536
+LENS, MOMENT = 1, 2  # what may differ between two rays through the same place of the picture
 
 
 class Ray(NamedTuple):
@@ -40,6 +41,7 @@ class Camera(Member, family="cameras"):
     readout: float = number("how much later the bottom row is exposed (rolling shutter)", default=0.0, unit="s")
     _spread: Any = derived_number("angle between neighbouring rays of sight, rad", lambda c: c.pixel_angle())
     _apart: Any = derived_number("distance between where neighbouring rays start, m", lambda c: c.pixel_distance())
+    _chance: Any = derived_integer("what differs from sample to sample: 1 the lens, 2 the time", lambda c: c.chance())
 
     def world_from_camera(self) -> np.ndarray:
         """Pose, (4, 4) float64: columns +x right, +y down, +z forward, and the eye."""
@@ -83,6 +85,15 @@ class Camera(Member, family="cameras"):
         _, (a, b) = self.rays([(x - 0.5, y), (x + 0.5, y)])
         return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
+    @property
+    def has_lens(self) -> bool:
+        """Whether it matters through which place of a lens a ray goes."""
+        return False
+
+    def chance(self) -> int:
+        """What of a ray is left to chance, as bits: `LENS`, `MOMENT`. The engine draws no numbers for the rest."""
+        return LENS * self.has_lens + MOMENT * (self.shutter_close > self.shutter_open)
+
     def pixel_distance(self) -> float:
         """Distance between where the rays of the two pixels in the middle start, metres; 0 if all leave one point."""
         x, y = self.width / 2, self.height / 2
@@ -101,7 +112,7 @@ class Camera(Member, family="cameras"):
         return self.replace(width=width, height=height)
 
 
-WIDTH, HEIGHT, SHUTTER_OPEN, SHUTTER_CLOSE, READOUT, SPREAD, APART = Camera.offsets()
+WIDTH, HEIGHT, SHUTTER_OPEN, SHUTTER_CLOSE, READOUT, SPREAD, APART, CHANCE = Camera.offsets()
 
 
 @method(0)

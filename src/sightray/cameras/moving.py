@@ -80,6 +80,10 @@ class MovingCamera(Camera):
     _count: Any = derived_integer("number of keyframes", lambda c: len(c.poses.times))
     _home: Any = derived_array("columns of the carried camera's own pose", lambda c: c.home().T.copy())
 
+    @property
+    def has_lens(self) -> bool:
+        return bool(self.camera.has_lens)
+
     def check(self) -> None:
         for name in SHARED:
             object.__setattr__(self, name, getattr(self.camera, name))

@@ -60,6 +60,10 @@ class ThinLensCamera(PerspectiveCamera):
         if self.blades in (1, 2):
             raise SceneError(f"ThinLensCamera.blades: got {self.blades}; allowed: 0 for a disk, or at least 3")
 
+    @property
+    def has_lens(self) -> bool:
+        return self.aperture() > 0.0
+
     def aperture(self) -> float:
         """Radius of the aperture, metres."""
         if self.f_number is not None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from sightray._jit import kernel
-from sightray.cameras.base import Ray, sight_ray
+from sightray.cameras.base import CHANCE, MOMENT, Ray, sight_ray
+from sightray.cameras.base import LENS as THROUGH_LENS
 from sightray.film.film import add_sample, samples_taken
 from sightray.filters.table import sample_filter
 from sightray.integrators.base import Radiance, radiance
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, i32_at, i64_at, table_at
 from sightray.mathlib.vec import dot, grey
-from sightray.samplers.base import Draws, begin, nested, number, pair
+from sightray.samplers.base import Draws, Pair, begin, nested, number, pair
 from sightray.scene.world import CAMERA
 
 # Dimensions of a sample's draws that the engine takes; integrators have draws of their own.
@@ -37,6 +38,7 @@ def render_tile(
     filter; with `centred` the first one goes through the pixel's centre. A non-zero word in `stop` ends the tile.
     """
     camera = table_at(world, CAMERA)
+    chance = i64_at(camera, CHANCE)
     rays = 0
     for y in range(y0, y1):
         for x in range(x0, x1):
@@ -45,7 +47,11 @@ def render_tile(
                 if i64_at(stop, 0) != 0:
                     return rays
                 draws = begin(sampler, x, y, seed, s, expected)
-                place, lens, when = pair(draws, PLACE), pair(draws, LENS), number(draws, TIME)
+                place, lens, when = pair(draws, PLACE), Pair(0.5, 0.5), 0.5
+                if chance & THROUGH_LENS != 0:
+                    lens = pair(draws, LENS)
+                if chance & MOMENT != 0:
+                    when = number(draws, TIME)
                 fx, fy = sample_filter(filters, place.u), sample_filter(filters, place.v)
                 dx, dy, weight = fx.offset, fy.offset, fx.weight * fy.weight
                 if s == 0 and centred != 0:

@@ -10,14 +10,14 @@ from sightray.integrators.base import Radiance
 from sightray.integrators.nesting import Nest, crossing
 from sightray.integrators.shading import Frame, first_step, into
 from sightray.integrators.terminator import shadow_ray
-from sightray.lights.base import cells, direction_density, illuminate, sky
+from sightray.lights.base import WHOLE, direction_density, illuminate, sky
 from sightray.materials.base import bsdf
 from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, is_null, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, max4
 from sightray.media.base import phase, transmittance
-from sightray.samplers.base import Draws, nested, pair
+from sightray.samplers.base import Draws, nested, number, pair
 from sightray.scene.light_choice import choose_light, light_probability
 from sightray.scene.world import (
     BACKGROUND,
@@ -28,6 +28,7 @@ from sightray.scene.world import (
     find_closest,
     is_blocked,
     light_at,
+    light_count,
     point_of,
     thin_beam,
 )
@@ -47,20 +48,25 @@ def lit_normal(point: Point) -> Vec3:
 
 
 @kernel
+def which_light(world: Table, own: Draws) -> f64:
+    """The number that chooses a light; none is drawn where there is no choice."""
+    return number(own, LIGHT) if light_count(world) > 1 else 0.0
+
+
+@kernel
 def direct_light(
     world: Table, point: Point, start: Vec3, frame: Frame, wo: Vec3, t_min: f64, nest: Nest, bands: Table, own: Draws
 ) -> Radiance:
     """Light that a surface reflects from one light, at one of its points, over the probability of that choice."""
-    which, place = pair(own, LIGHT), pair(own, PLACE)
-    chosen = choose_light(world, point.p, lit_normal(point), which.u)
+    place = pair(own, PLACE)
+    chosen = choose_light(world, point.p, lit_normal(point), which_light(world, own))
     if chosen.light < 0:
         return Radiance(grey(0.0), 0)
     light = light_at(world, chosen.light)
-    parts = cells(light)
-    sample = illuminate(light, point.p, min(parts - 1, int(which.v * parts)), place.u, place.v)
+    sample = illuminate(light, point.p, WHOLE, place.u, place.v)
     wi = into(frame, sample.direction)
     answer = bsdf(point.material, point.where, wo, wi)
-    found = answer.value * as_light(bands, sample.irradiance) * (parts / chosen.probability)
+    found = answer.value * as_light(bands, sample.irradiance) * (1.0 / chosen.probability)
     if max4(found) <= 0.0:
         return Radiance(grey(0.0), 0)
     behind = crossing(world, nest, point, sample.direction) if wo.z * wi.z < 0.0 else nest
@@ -68,27 +74,26 @@ def direct_light(
     left = unblocked(world, ray.o, ray.d, t_min, ray.distance - t_min, behind, bands, own)
     if max4(left) <= 0.0:
         return Radiance(grey(0.0), 1)
-    p = direction_density(light, point.p, sample.direction, sample.distance) * chosen.probability
+    p = sample.density * chosen.probability
     return Radiance(found * left * (power_heuristic(p, answer.density) if p > 0.0 else 1.0), 1)
 
 
 @kernel
 def direct_light_within(world: Table, p: Vec3, d: Vec3, nest: Nest, bands: Table, own: Draws) -> Radiance:
     """Light that the medium at p scatters from one light into the way back along d."""
-    which, place = pair(own, LIGHT), pair(own, PLACE)
-    chosen = choose_light(world, p, grey(0.0), which.u)
+    place = pair(own, PLACE)
+    chosen = choose_light(world, p, grey(0.0), which_light(world, own))
     if chosen.light < 0:
         return Radiance(grey(0.0), 0)
     light = light_at(world, chosen.light)
-    parts = cells(light)
-    sample = illuminate(light, p, min(parts - 1, int(which.v * parts)), place.u, place.v)
+    sample = illuminate(light, p, WHOLE, place.u, place.v)
     density = phase(nest.here, dot(d, sample.direction))
-    found = as_light(bands, sample.irradiance) * (density * parts / chosen.probability)
+    found = as_light(bands, sample.irradiance) * (density / chosen.probability)
     if max4(found) <= 0.0:
         return Radiance(grey(0.0), 0)
     before = (sample.distance - first_step(math.nan, p, 0.0)) * (1.0 - 1e-9)  # the light's own surface is no obstacle
     left = unblocked(world, p, sample.direction, 0.0, before, nest, bands, own)
-    q = direction_density(light, p, sample.direction, sample.distance) * chosen.probability
+    q = sample.density * chosen.probability
     return Radiance(found * left * (power_heuristic(q, density) if q > 0.0 else 1.0), 1)
 
 

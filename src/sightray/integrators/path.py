@@ -139,17 +139,17 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         if depth >= i64_at(integrator, DEPTH):
             break
 
-        # Look for a light.
+        # Choose where to go on, which does not wait for the shadow ray; then look for a light.
         frame = frame_of(point)
         wo = into(frame, -d)
+        way, choice = pair(own, WAY), pair(own, CHOICE)
+        chosen = sample_bsdf(point.material, point.where, wo, way.u, way.v, choice.u)
         if light_count(world) > 0:
             direct = direct_light(world, point, lifted(world, hit, point), frame, wo, t_min, nest, bands, own)
             rays += direct.rays
             color += limited(integrator, beta * direct.color, depth + 1)
 
         # Go on in a direction that the material chooses, or end the walk if it has become unimportant.
-        way, choice = pair(own, WAY), pair(own, CHOICE)
-        chosen = sample_bsdf(point.material, point.where, wo, way.u, way.v, choice.u)
         beta = beta * chosen.weight
         odds = survival(integrator, beta, event)
         if choice.v >= odds:

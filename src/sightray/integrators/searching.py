@@ -60,7 +60,7 @@ def from_lights(
             sample = illuminate(light, point.p, index % parts, place.u, place.v)
             wi = into(frame, sample.direction)
             answer = bsdf(point.material, point.where, wo, wi)
-            p = direction_density(light, point.p, sample.direction, sample.distance) * chosen.probability
+            p = sample.density * chosen.probability
             q = density_of(search, wi, answer.density)
             found = answer.value * sample.irradiance * looked_for(search, parts * repeats * p, q)
             if max3(found) > 0.0:

@@ -11,9 +11,9 @@ import math
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, color, flag, integer
-from sightray.lights.base import Light, LightSample, cells
+from sightray.lights.base import WHOLE, Light, LightSample, cells
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, i64_at
+from sightray.mathlib.table import Table, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey
 
 MAX_GRID = 64
@@ -36,30 +36,34 @@ def square_of_cells(light: Table) -> i64:
 
 
 @kernel
-def place_in_grid(light: Table, cell: i64, u: f64, v: f64) -> Vec3:
-    """The point (u, v) of a cell, as x and y in the unit square that the grid divides."""
-    return place_in_cells(i64_at(light, GRID), cell, u, v)
+def cut(n: i64, cell: i64) -> i64:
+    """Into how many cells a side of the light is cut: n, or 1 if it is asked as a whole."""
+    return 1 if cell == WHOLE else n
 
 
 @kernel
 def place_in_cells(n: i64, cell: i64, u: f64, v: f64) -> Vec3:
     """The point (u, v) of one of n x n cells, as x and y in the unit square."""
+    if n == 1:
+        return Vec3(u, v, 0.0, 0.0)
     return Vec3((cell % n + u) / n, (cell // n + v) / n, 0.0, 0.0)
 
 
 @kernel
-def from_piece(p: Vec3, q: Vec3, normal: Vec3, radiant: Vec3, two_sided: bool) -> LightSample:
-    """Light at `p` from a small flat piece at `q`; `radiant` is its radiance times its area."""
+def from_piece(light: Table, p: Vec3, q: Vec3, normal: Vec3, area: f64, parts: i64, two_sided: bool) -> LightSample:
+    """Light at `p` from one of the `parts` of a flat light, by a sample at `q`."""
     to_light = q - p
     r2 = dot(to_light, to_light)
     if not r2 > 0.0:
-        return LightSample(-normal, 0.0, grey(0.0))
+        return LightSample(-normal, 0.0, grey(0.0), 0.0)
     r = math.sqrt(r2)
     to_light = to_light / r
     cosine = -dot(to_light, normal)
     if two_sided:
         cosine = abs(cosine)
-    return LightSample(to_light, r, radiant * (max(cosine, 0.0) / r2))
+    seen = max(cosine, 0.0) * area / r2  # solid angle of the light, if all of it were like this
+    density = 1.0 / seen if seen > 0.0 and i64_at(light, VISIBLE) != 0 else 0.0
+    return LightSample(to_light, r, vec3_at(light, RADIANCE) * (seen / parts), density)
 
 
 @kernel

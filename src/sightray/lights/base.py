@@ -2,7 +2,8 @@
 
 A light is asked in `illuminate` how much of its light would arrive at a point if nothing stood between. Lights with
 an area are cut into `cells`, one shadow ray each, so that shadows grow soft (R. Cook, T. Porter, L. Carpenter,
-"Distributed ray tracing", SIGGRAPH 1984); lights without one have a single cell.
+"Distributed ray tracing", SIGGRAPH 1984); lights without one have a single cell. Who sends but one ray asks for the
+`WHOLE` light.
 """
 
 from __future__ import annotations
@@ -18,13 +19,16 @@ from sightray.mathlib.table import Table
 from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 
+WHOLE = -1  # instead of a cell: the whole light at once
+
 
 class LightSample(NamedTuple):
-    """Light that one cell sends to a point."""
+    """Light that one cell, or the whole light, sends to a point."""
 
     direction: Vec3  # unit, from the point to the light
     distance: f64  # metres; infinite for directional lights
     irradiance: Vec3  # on a surface that faces the light
+    density: f64  # per solid angle, with which the cells together choose this direction; see `direction_density`
 
 
 class LightBounds(NamedTuple):
@@ -90,7 +94,7 @@ def cells(light: Table) -> i64:
 
 @method(1)
 def illuminate(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    """Light from one cell; u, v in [0, 1) place the sample in the cell."""
+    """Light from one cell, or from the `WHOLE`; u, v in [0, 1) place the sample in it."""
     raise NotImplementedError
 
 

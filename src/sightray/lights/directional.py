@@ -31,4 +31,4 @@ _, IRRADIANCE, TO_LIGHT = DirectionalLight.offsets()
 
 @implements(illuminate, DirectionalLight)
 def illuminate_from_afar(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    return LightSample(vec3_at(light, TO_LIGHT), math.inf, vec3_at(light, IRRADIANCE))
+    return LightSample(vec3_at(light, TO_LIGHT), math.inf, vec3_at(light, IRRADIANCE), 0.0)

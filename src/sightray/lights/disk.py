@@ -9,7 +9,7 @@ import numpy as np
 
 from sightray._jit import implements
 from sightray.fields import Point, derived_vector, flag, number, vector
-from sightray.lights.area import GRID, RADIANCE, _AreaLight, flat_density, from_piece, place_in_grid
+from sightray.lights.area import GRID, _AreaLight, cut, flat_density, from_piece, place_in_cells
 from sightray.lights.base import LightBounds, LightSample, direction_density, flat, illuminate
 from sightray.mathlib.axes import axes_across
 from sightray.mathlib.scalars import f64, i64
@@ -67,12 +67,12 @@ CENTER, _, RADIUS, TWO_SIDED, NORMAL, ACROSS, ALONG = DiskLight.offsets()[3:]
 
 @implements(illuminate, DiskLight)
 def illuminate_from_disk(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    s = place_in_grid(light, cell, u, v)
+    n, radius = cut(i64_at(light, GRID), cell), f64_at(light, RADIUS)
+    s = place_in_cells(n, cell, u, v)
     s = concentric(s.x, s.y)
     q = vec3_at(light, CENTER) + vec3_at(light, ACROSS) * s.x + vec3_at(light, ALONG) * s.y
-    n, radius = i64_at(light, GRID), f64_at(light, RADIUS)
-    radiant = vec3_at(light, RADIANCE) * (math.pi * radius * radius / (n * n))
-    return from_piece(p, q, vec3_at(light, NORMAL), radiant, i64_at(light, TWO_SIDED) != 0)
+    area, both = math.pi * radius * radius, i64_at(light, TWO_SIDED) != 0
+    return from_piece(light, p, q, vec3_at(light, NORMAL), area, n * n, both)
 
 
 @implements(direction_density, DiskLight)

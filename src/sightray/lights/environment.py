@@ -10,14 +10,15 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Color, color, derived_array, derived_integer, derived_vector, integer, other
-from sightray.lights.area import MAX_GRID, place_in_cells
+from sightray.lights.area import MAX_GRID, cut, place_in_cells
 from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, sky
 from sightray.lights.picture import LUMINANCE, picture, pixel_at, radiant_pixels
 from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, i64_at, table_at, vec3_at
+from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.transform import Transform, as_transform
 from sightray.mathlib.vec import Vec3, dot, grey
+from sightray.mathlib.warp import circle
 
 TURNED = 1e-6  # how far the axes may be from orthonormal
 
@@ -63,6 +64,7 @@ class EnvironmentLight(Light):
     _width: Any = derived_integer("columns", lambda e: e.pixels.shape[1])
     _height: Any = derived_integer("rows", lambda e: e.pixels.shape[0])
     _pixels: Any = derived_array("colours, three floats each", lambda e: e.pixels)
+    _edges: Any = derived_array("cosines of the angles from +y of the rows' edges, height + 1", lambda e: e.edges())
     _sums: Any = derived_array("cumulated weights of the pixels", lambda e: cumulated(e.weights()))
 
     @property
@@ -73,6 +75,10 @@ class EnvironmentLight(Light):
     def pixels(self) -> np.ndarray:
         """The picture, (h, w, 3) float32, linear, read-only; one white pixel if there is none."""
         return self.__dict__["_picture"]
+
+    def edges(self) -> np.ndarray:
+        """Cosines of the angles from +y where rows begin and the last one ends, (h + 1,) float64."""
+        return np.cos(np.linspace(0.0, math.pi, len(self.pixels) + 1))
 
     def check(self) -> None:
         """Read the file once, so that a missing one is an error where the light is stated."""
@@ -86,11 +92,10 @@ class EnvironmentLight(Light):
         bright = 0.75 * bright + 0.125 * (np.roll(bright, 1, axis=1) + np.roll(bright, -1, axis=1))
         above, below = np.vstack([bright[:1], bright[:-1]]), np.vstack([bright[1:], bright[-1:]])
         bright = 0.75 * bright + 0.125 * (above + below)
-        edges = np.cos(np.linspace(0.0, math.pi, len(bright) + 1))
-        return bright * (edges[:-1] - edges[1:])[:, None]
+        return bright * -np.diff(self.edges())[:, None]
 
 
-RADIANCE, GRID, X, Y, Z, WIDTH, HEIGHT, PIXELS, SUMS = EnvironmentLight.offsets()
+RADIANCE, GRID, X, Y, Z, WIDTH, HEIGHT, PIXELS, EDGES, SUMS = EnvironmentLight.offsets()
 
 
 @implements(cells, EnvironmentLight)
@@ -132,7 +137,16 @@ def solid_angle_of(row: i64, w: i64, h: i64) -> f64:
 def looked_up(light: Table, d: Vec3) -> Vec3:
     """Radiance that comes from a direction of the picture."""
     w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
-    x, y = column_of(d, w) - 0.5, row_of(d, h) - 0.5
+    if w * h == 1:
+        return vec3_at(light, RADIANCE) * pixel_at(table_at(light, PIXELS), 1, 0, 0)
+    return between_pixels(light, column_of(d, w), row_of(d, h))
+
+
+@kernel
+def between_pixels(light: Table, along: f64, down: f64) -> Vec3:
+    """Radiance from a place in the picture, 0 to w along a row and 0 to h down a column."""
+    w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
+    x, y = along - 0.5, down - 0.5
     left, top = math.floor(x), math.floor(y)
     s, t = x - left, y - top
     column, row = int(left) % w, min(max(int(top), 0), h - 1)
@@ -151,22 +165,27 @@ def sky_of_environment(light: Table, d: Vec3) -> Vec3:
 @implements(illuminate, EnvironmentLight)
 def illuminate_from_environment(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
     # Draw a pixel, and a direction in it that is even in solid angle.
-    w, h, n = i64_at(light, WIDTH), i64_at(light, HEIGHT), i64_at(light, GRID)
+    w, h, n = i64_at(light, WIDTH), i64_at(light, HEIGHT), cut(i64_at(light, GRID), cell)
     place = place_in_cells(n, cell, u, v)
     drawn = draw_cell(table_at(light, SUMS), w, h, place.x, place.y)
-    upper, lower = math.cos(math.pi * drawn.row / h), math.cos(math.pi * (drawn.row + 1) / h)
+    edges = table_at(light, EDGES)
+    upper, lower = f64_at(edges, drawn.row), f64_at(edges, drawn.row + 1)
     cosine = upper + (lower - upper) * drawn.v
     sine = math.sqrt(max(0.0, 1.0 - cosine * cosine))
-    phi = 2.0 * math.pi * ((drawn.column + drawn.u) / w - 0.5)
-    d = Vec3(sine * math.sin(phi), cosine, -sine * math.cos(phi))
+    column = drawn.column + drawn.u
+    around = circle(column / w - 0.5)
+    d = Vec3(sine * around.y, cosine, -sine * around.x)
     if not drawn.probability > 0.0:
-        return LightSample(out_of_picture(light, d), math.inf, grey(0.0))
-    share = solid_angle_of(drawn.row, w, h) / (drawn.probability * n * n)
-    return LightSample(out_of_picture(light, d), math.inf, looked_up(light, d) * share)
+        return LightSample(out_of_picture(light, d), math.inf, grey(0.0), 0.0)
+    density = drawn.probability / (2.0 * math.pi / w * (upper - lower))
+    radiance = between_pixels(light, column, row_of(d, h))
+    return LightSample(out_of_picture(light, d), math.inf, radiance * (1.0 / (density * (n * n))), density)
 
 
 @implements(direction_density, EnvironmentLight)
 def density_of_environment(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # noqa: E741
+    if i64_at(light, WIDTH) * i64_at(light, HEIGHT) == 1:
+        return 0.25 / math.pi
     d = into_picture(light, l)
     w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
     row, column = min(int(row_of(d, h)), h - 1), min(int(column_of(d, w)), w - 1)

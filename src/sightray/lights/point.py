@@ -38,4 +38,4 @@ def illuminate_from_point(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> L
     to_light = vec3_at(light, POSITION) - p
     r = length(to_light)
     c = vec3_at(light, ATTENUATION)
-    return LightSample(to_light / r, r, vec3_at(light, INTENSITY) / (c.x + c.y * r + c.z * r * r))
+    return LightSample(to_light / r, r, vec3_at(light, INTENSITY) / (c.x + c.y * r + c.z * r * r), 0.0)

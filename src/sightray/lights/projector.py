@@ -138,10 +138,10 @@ def illuminate_from_projector(light: Table, p: Vec3, cell: i64, u: f64, v: f64) 
     forward = vec3_at(light, FORWARD)
     z = -dot(forward, to_light)
     if not z > 0.0:
-        return LightSample(to_light / r if r > 0.0 else -forward, r, grey(0.0))
+        return LightSample(to_light / r if r > 0.0 else -forward, r, grey(0.0), 0.0)
     focal, w, h = f64_at(light, FOCAL), i64_at(light, WIDTH), i64_at(light, HEIGHT)
     x = 0.5 * w - focal * dot(vec3_at(light, RIGHT), to_light) / z
     y = 0.5 * h - focal * dot(vec3_at(light, DOWN), to_light) / z
     if not (0.0 <= x < w and 0.0 <= y < h):
-        return LightSample(to_light / r, r, grey(0.0))
-    return LightSample(to_light / r, r, vec3_at(light, INTENSITY) * pixel_of(light, x, y) / (r * r))
+        return LightSample(to_light / r, r, grey(0.0), 0.0)
+    return LightSample(to_light / r, r, vec3_at(light, INTENSITY) * pixel_of(light, x, y) / (r * r), 0.0)

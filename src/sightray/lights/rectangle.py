@@ -9,7 +9,7 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_integer, derived_number, derived_vector, flag, vector
-from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, flat_density, from_piece, place_in_grid
+from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, cut, flat_density, from_piece, place_in_cells
 from sightray.lights.base import (
     LightBounds,
     LightPolygon,
@@ -93,8 +93,8 @@ def window_from(light: Table, p: Vec3) -> Window:
 
 @implements(illuminate, RectangleLight)
 def illuminate_from_rectangle(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    s = place_in_grid(light, cell, u, v)
-    n = i64_at(light, GRID)
+    n = cut(i64_at(light, GRID), cell)
+    s = place_in_cells(n, cell, u, v)
     if i64_at(light, UPRIGHT) != 0:
         window = window_from(light, p)
         if window.solid_angle > 0.0:
@@ -102,10 +102,11 @@ def illuminate_from_rectangle(light: Table, p: Vec3, cell: i64, u: f64, v: f64) 
             r = length(to_light)
             lit = dot(to_light, vec3_at(light, NORMAL)) < 0.0 or i64_at(light, TWO_SIDED) != 0
             share = window.solid_angle / (n * n) if lit else 0.0
-            return LightSample(to_light / r, r, vec3_at(light, RADIANCE) * share)
+            density = 1.0 / window.solid_angle if i64_at(light, VISIBLE) != 0 else 0.0
+            return LightSample(to_light / r, r, vec3_at(light, RADIANCE) * share, density)
     q = vec3_at(light, CORNER) + vec3_at(light, EDGE_U) * s.x + vec3_at(light, EDGE_V) * s.y
-    radiant = vec3_at(light, RADIANCE) * (f64_at(light, AREA) / (n * n))
-    return from_piece(p, q, vec3_at(light, NORMAL), radiant, i64_at(light, TWO_SIDED) != 0)
+    both = i64_at(light, TWO_SIDED) != 0
+    return from_piece(light, p, q, vec3_at(light, NORMAL), f64_at(light, AREA), n * n, both)
 
 
 @implements(direction_density, RectangleLight)

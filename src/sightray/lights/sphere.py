@@ -9,12 +9,13 @@ import numpy as np
 
 from sightray._jit import implements, kernel
 from sightray.fields import Point, number, vector
-from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, place_in_grid
+from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, cut, place_in_cells
 from sightray.lights.base import LightBounds, LightSample, around, direction_density, illuminate
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, cross, length
+from sightray.mathlib.warp import circle
 
 
 class SphereLight(_AreaLight):
@@ -83,8 +84,8 @@ def in_cone(axis: Vec3, cap: f64, u: f64, v: f64) -> Vec3:
     height = u * cap
     sine = math.sqrt(max(0.0, height * (2.0 - height)))
     across = perpendicular(axis)
-    phi = 2.0 * math.pi * v
-    return axis * (1.0 - height) + (across * math.cos(phi) + cross(axis, across) * math.sin(phi)) * sine
+    around = circle(v)
+    return axis * (1.0 - height) + (across * around.x + cross(axis, across) * around.y) * sine
 
 
 @kernel
@@ -108,10 +109,12 @@ def toward_sphere(p: Vec3, center: Vec3, radius: f64, u: f64, v: f64) -> Way:
 
 @implements(illuminate, SphereLight)
 def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    s = place_in_grid(light, cell, u, v)
+    n = cut(i64_at(light, GRID), cell)
+    s = place_in_cells(n, cell, u, v)
     way = toward_sphere(p, vec3_at(light, CENTER), f64_at(light, RADIUS), s.x, s.y)
-    n = i64_at(light, GRID)
-    return LightSample(way.direction, way.distance, vec3_at(light, RADIANCE) * (way.solid_angle / (n * n)))
+    density = 1.0 / way.solid_angle if way.solid_angle > 0.0 and i64_at(light, VISIBLE) != 0 else 0.0
+    irradiance = vec3_at(light, RADIANCE) * (way.solid_angle / (n * n))
+    return LightSample(way.direction, way.distance, irradiance, density)
 
 
 @implements(direction_density, SphereLight)

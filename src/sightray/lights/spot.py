@@ -76,8 +76,8 @@ def illuminate_from_spot(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> Li
     r = length(to_light)
     axis = vec3_at(light, AXIS)
     if not r > 0.0:
-        return LightSample(-axis, 0.0, grey(0.0))
+        return LightSample(-axis, 0.0, grey(0.0), 0.0)
     to_light = to_light / r
     c = vec3_at(light, ATTENUATION)
     share = falloff(-dot(to_light, axis), f64_at(light, COS_OUTER), f64_at(light, COS_INNER))
-    return LightSample(to_light, r, vec3_at(light, INTENSITY) * (share / (c.x + c.y * r + c.z * r * r)))
+    return LightSample(to_light, r, vec3_at(light, INTENSITY) * (share / (c.x + c.y * r + c.z * r * r)), 0.0)

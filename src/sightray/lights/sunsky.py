@@ -22,7 +22,7 @@ from sightray.fields import (
     text,
     vector,
 )
-from sightray.lights.area import MAX_GRID, place_in_cells
+from sightray.lights.area import MAX_GRID, cut, place_in_cells
 from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, sky
 from sightray.lights.daylight import SUN_RADIUS, Perez, preetham, rgb_of_luminance, sky_brightness, sun_brightness
 from sightray.lights.daylight import sun_direction as sun_at
@@ -34,6 +34,7 @@ from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, vexp, vmax
+from sightray.mathlib.warp import circle
 
 W, H, FINE = 128, 64, 4  # cells of the table that directions are drawn from, and places in each, along a side
 LEAST, MOST = 0.1, 0.9  # share of samples that go to the sun, if there are both
@@ -219,7 +220,7 @@ def density_of_sun_and_sky(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64
 
 @implements(illuminate, SunSky)
 def illuminate_from_sun_and_sky(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> LightSample:
-    n = i64_at(light, GRID)
+    n = cut(i64_at(light, GRID), cell)
     place = place_in_cells(n, cell, u, v)
     share = f64_at(light, SUN_SHARE)
     if place.x < share:
@@ -229,9 +230,9 @@ def illuminate_from_sun_and_sky(light: Table, p: Vec3, cell: i64, u: f64, v: f64
         upper, lower = math.cos(math.pi * drawn.row / H), math.cos(math.pi * (drawn.row + 1) / H)
         cosine = upper + (lower - upper) * drawn.v
         sine = math.sqrt(max(0.0, 1.0 - cosine * cosine))
-        phi = 2.0 * math.pi * ((drawn.column + drawn.u) / W - 0.5)
-        d = Vec3(sine * math.sin(phi), cosine, -sine * math.cos(phi))
+        around = circle((drawn.column + drawn.u) / W - 0.5)
+        d = Vec3(sine * around.y, cosine, -sine * around.x)
     density = density_of_sun_and_sky(light, p, d, math.inf)
     if not density > 0.0:
-        return LightSample(d, math.inf, grey(0.0))
-    return LightSample(d, math.inf, sky_of_sun_and_sky(light, d) / (density * (n * n)))
+        return LightSample(d, math.inf, grey(0.0), 0.0)
+    return LightSample(d, math.inf, sky_of_sun_and_sky(light, d) / (density * (n * n)), density)

@@ -21,14 +21,14 @@ that the same kernels serve RGB and spectral paths.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sightray._jit import implements, method
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, no_table
 from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
-from sightray.textures.base import Where
+from sightray.textures.base import Texture, Where
 
 PHONG, BLINN = 0, 1
 
@@ -71,7 +71,8 @@ class Material(Member, family="materials"):
     `cutout` (it has holes: `opacity`), `bumpy` (it bends normals: `bent_normal`), `oriented` (its answers depend on
     the direction of the tangent, so the frame's x must be along it), `clear` (light passes straight through, as
     through the bare boundary of a fog: shadow rays go on behind it), `thin` (a sheet: light that passes is inside of
-    nothing), `translucent` (light from behind shows: `bsdf` is not zero across the surface).
+    nothing), `translucent` (light from behind shows: `bsdf` is not zero across the surface), `patterned` (it asks
+    textures, which want to know how wide the ray is and which way the surface faces in object space).
     """
 
     @property
@@ -105,9 +106,23 @@ class Material(Member, family="materials"):
         return False
 
     @property
+    def patterned(self) -> bool:
+        """Whether it has textures that are not the same everywhere."""
+        return any(_differs(value) for value in self.values().values())
+
+    @property
     def thin(self) -> bool:
         """Whether it is a sheet with the same medium on both sides, such as a pane or a leaf."""
         return False
+
+
+def _differs(value: Any) -> bool:
+    """Whether a field's value is a texture, or a material with one, that is not the same everywhere."""
+    from sightray.textures.constant import Constant
+
+    if isinstance(value, Material):
+        return value.patterned
+    return isinstance(value, Texture) and not isinstance(value, Constant)
 
 
 @method(0)

@@ -29,6 +29,7 @@ from sightray.materials.beckmann import sample_visible_slope
 from sightray.materials.energy import SMOOTH
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.vec import Vec3, dot, normalize
+from sightray.mathlib.warp import circle
 
 DISTRIBUTIONS = ("ggx", "beckmann")  # at the indices GGX and BECKMANN
 GGX, BECKMANN = 0, 1
@@ -110,8 +111,8 @@ def sample_facet(facets: Facets, wo: Vec3, u: f64, v: f64) -> Vec3:
     if facets.kind == GGX:
         # What is seen of a hemisphere, mirrored, is a cap of the sphere.
         z = (1.0 - u) * (1.0 + stretched.z) - stretched.z
-        sine, phi = math.sqrt(max(0.0, 1.0 - z * z)), 2.0 * math.pi * v
-        m = Vec3(sine * math.cos(phi), sine * math.sin(phi), z) + stretched
+        sine, around = math.sqrt(max(0.0, 1.0 - z * z)), circle(v)
+        m = Vec3(sine * around.x, sine * around.y, z) + stretched
     else:
         m = sample_visible_slope(stretched, u, v)
     return normalize(Vec3(m.x * facets.x, m.y * facets.y, max(m.z, 1e-12)))

@@ -10,7 +10,7 @@ from sightray.mathlib.frame import fresnel
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at
 from sightray.mathlib.vec import Vec3
-from sightray.mathlib.warp import cosine_hemisphere
+from sightray.mathlib.warp import circle, cosine_hemisphere
 
 PLANE = ROUGHNESSES * COSINES  # entries of one azimuth
 
@@ -67,8 +67,8 @@ def sample_spread(roughness: f64, u: f64, v: f64) -> Vec3:
         return cosine_hemisphere(2.0 * u, v)
     alpha, s = max(SMOOTH, roughness * roughness), 2.0 * u - 1.0
     z = alpha * s / (1.0 + alpha - s)
-    sine, phi = math.sqrt(max(0.0, 1.0 - z * z)), 2.0 * math.pi * v
-    return Vec3(sine * math.cos(phi), sine * math.sin(phi), z)
+    sine, around = math.sqrt(max(0.0, 1.0 - z * z)), circle(v)
+    return Vec3(sine * around.x, sine * around.y, z)
 
 
 @kernel

@@ -69,11 +69,9 @@ def cell_probability(table: Table, w: i64, h: i64, row: i64, column: i64) -> f64
 @kernel
 def interval(table: Table, first: i64, count: i64, x: f64) -> i64:
     """The interval k of `count` with sums[k] <= x < sums[k + 1], of sums that start at word `first`, for x < 1."""
-    low, high = 0, count
-    while high - low > 1:
-        middle = (low + high) // 2
-        if f64_at(table, first + middle) <= x:
-            low = middle
-        else:
-            high = middle
-    return low
+    low, left = first, count
+    while left > 1:  # without branches that depend on x, which nobody could foresee
+        half = left >> 1
+        low = low + half if f64_at(table, low + half) <= x else low
+        left -= half
+    return low - first

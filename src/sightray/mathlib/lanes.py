@@ -323,6 +323,19 @@ def push_before_last8(stack: Table, top: i64, keys: I64x8, count: i64) -> None:
 
 
 @primitive
+def select8(choice: Mask8, a: F32x8, b: F32x8) -> F32x8:
+    """`a` where `choice` is true, else `b`."""
+    return _select(choice.bits, a, b)
+
+
+@primitive
+def sqrt8(a: F32x8) -> F32x8:
+    """Square roots; NaN of what is negative."""
+    with np.errstate(invalid="ignore"):
+        return F32x8(np.sqrt(a.values))
+
+
+@primitive
 def select16(choice: Mask16, a: F32x16, b: F32x16) -> F32x16:
     """`a` where `choice` is true, else `b`."""
     return _select(choice.bits, a, b)

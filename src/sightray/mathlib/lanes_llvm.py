@@ -144,13 +144,14 @@ def _lower_width(width: int, scalar: Any, suffix: str, names: str) -> None:
         "splat": splat, "load": load, "store": store, "movemask": movemask, "vmin": _select("<"), "vmax": _select(">"),
         "flip": flip, "abs": absolute, "least": least, "select": lambda builder, c, a, b: builder.select(c, a, b),
         "product": lambda builder, a, b: builder.fmul(a, b),
+        "sqrt": lambda builder, a: llvm_function(builder, f"llvm.sqrt.{kinds}", kind, a),
     }  # fmt: skip
     for name in names.split():
         lower(getattr(lanes, f"{name}{width}{suffix}"))(every[name])
 
 
 _lower_width(4, F32, "", "splat load store movemask vmin vmax flip")
-_lower_width(8, F32, "", "splat load store movemask vmin vmax")
+_lower_width(8, F32, "", "splat load store movemask vmin vmax select sqrt")
 _lower_width(16, F32, "", "splat load store movemask vmin vmax flip least select")
 _lower_width(16, F64, "d", "splat load store vmin vmax abs select product")
 

@@ -13,6 +13,7 @@ from sightray._jit import kernel
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.vec import Vec3, cross
+from sightray.mathlib.warp import circle
 from sightray.media.base import PhaseSample
 
 NEARLY_EVEN = 1e-3  # below this |g| the inverse loses its digits, and even scattering is as good
@@ -33,7 +34,7 @@ def sample_henyey_greenstein(g: f64, d: Vec3, u: f64, v: f64) -> PhaseSample:
         ratio = (1.0 - g * g) / (1.0 - g + 2.0 * g * u)
         cosine = (1.0 + g * g - ratio * ratio) / (2.0 * g)
     cosine = min(1.0, max(-1.0, cosine))
-    sine, angle = math.sqrt(1.0 - cosine * cosine), 2.0 * math.pi * v
+    sine, around = math.sqrt(1.0 - cosine * cosine), circle(v)
     s = perpendicular(d)
-    way = s * (sine * math.cos(angle)) + cross(d, s) * (sine * math.sin(angle)) + d * cosine
+    way = s * (sine * around.x) + cross(d, s) * (sine * around.y) + d * cosine
     return PhaseSample(way, henyey_greenstein(g, cosine))

@@ -219,7 +219,8 @@ def world_bounds(item: Item) -> tuple[np.ndarray, np.ndarray]:
 
 def flags_of(material: Any) -> int:
     """What a material is beside a plain surface, as the bits of an item's FLAGS."""
-    kinds = ("cutout", "bumpy", "oriented", "clear", "thin", "translucent")  # in the order of the bits CUTOUT, BUMPY, ...
+    # In the order of the bits CUTOUT, BUMPY, ...
+    kinds = ("cutout", "bumpy", "oriented", "clear", "thin", "translucent", "patterned")
     return sum(1 << bit for bit, kind in enumerate(kinds) if getattr(material, kind))
 
 

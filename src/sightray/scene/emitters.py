@@ -170,7 +170,8 @@ def illuminate_from_patch(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> L
             way = in_window(window, u, v)
             r = length(way)
             way = way / r
-            return LightSample(way, r, glow_of_patch(light, p, way, r) * window.solid_angle)
+            glow = glow_of_patch(light, p, way, r)
+            return LightSample(way, r, glow * window.solid_angle, 1.0 / window.solid_angle)
     if kind == TRIANGLE:
         root = math.sqrt(u)
         s, t = 1.0 - root, v * root
@@ -183,11 +184,12 @@ def illuminate_from_patch(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> L
     to_light = q - p
     r = length(to_light)
     if not r > 0.0:
-        return LightSample(vec3_at(light, NORMAL), 0.0, grey(0.0))
+        return LightSample(vec3_at(light, NORMAL), 0.0, grey(0.0), 0.0)
     to_light = to_light / r
     cosine = -dot(to_light, vec3_at(light, NORMAL))
     radiance = glow_at(light, q, s, t, cosine)
-    return LightSample(to_light, r, radiance * (abs(cosine) * f64_at(light, AREA) / (r * r)))
+    seen = abs(cosine) * f64_at(light, AREA) / (r * r)
+    return LightSample(to_light, r, radiance * seen, 1.0 / seen if seen > 0.0 else 0.0)
 
 
 @implements(direction_density, _Patch)
@@ -217,10 +219,10 @@ def illuminate_from_ball(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> Li
     center, radius = vec3_at(light, CENTER), f64_at(light, RADIUS)
     way = toward_sphere(p, center, radius, u, v)
     if not way.solid_angle > 0.0:
-        return LightSample(way.direction, way.distance, grey(0.0))
+        return LightSample(way.direction, way.distance, grey(0.0), 0.0)
     q = p + way.direction * way.distance
     radiance = glow_at(light, q, 0.0, 0.0, dot(p - q, q - center) / (way.distance * radius))
-    return LightSample(way.direction, way.distance, radiance * way.solid_angle)
+    return LightSample(way.direction, way.distance, radiance * way.solid_angle, 1.0 / way.solid_angle)
 
 
 @implements(direction_density, _Ball)

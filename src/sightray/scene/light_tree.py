@@ -23,13 +23,20 @@ from sightray.accelerators.grow import Level, Tree, grow_tree
 from sightray.lights.base import LightBounds
 from sightray.mathlib.table import Space, Table, aligned, link
 
-# The chooser's row.
+# The chooser's row. LEAF_OF: for each light, eight times the node that it is in, plus the lane.
 NODES, LEAF_OF, APART, APART_COUNT, CHOOSER_WORDS = 0, 1, 2, 3, 4
-# A node. Fourth lanes: of the centre, the weight; of the variance along x, y and z, the squared radius of the ball; of
-# the mean normal, the variance of normals along any axis; of the cone's axis, the cosine beyond which there is no light.
-CENTER, VARIANCE, MEAN, AXIS = 0, 4, 8, 12
-COS_NORMALS, SIN_NORMALS = 16, 17
-CHILD, PARENT, SIZE, LIGHT_OF, NODE_WORDS = 18, 19, 20, 21, 24  # CHILD: the first of two, or -1; SIZE: number of lights
+# A node is 88 words. First the place of what its numbers are measured from, and the inverse of their unit, metres; then
+# where its parent stands as LEAF_OF says it, or -1.
+WIDTH = 8
+ORIGIN, PARENT = 0, 4
+# Then floats of its up to eight children, each kind eight times: centres, variances and mean normals along x, y and z;
+# axes of the cones of normals; radii of the balls; weights; SCATTER, the variance of normals along any axis; cosines and
+# sines of the cones; EDGE, the cosine beyond which there is no light; SIZE, numbers of lights, 0 where there is no child.
+CENTER, VARIANCE, MEAN, AXIS = 16, 40, 64, 88
+RADIUS, WEIGHT, SCATTER, COS_NORMALS, SIN_NORMALS, EDGE, SIZE = 112, 120, 128, 136, 144, 152, 160
+CHILDREN, NODE_WORDS = 168, 88  # eight integers: number of a node, or -1 minus that of a light
+# How much wider than they are bounds are taken, for single precision: of radii, in parts and in units, and of cosines.
+WIDER, AROUND, EDGEWISE = 1e-5, 1e-6, 2e-3
 BINS = 12
 FEW = 8  # lights, up to which a cluster is halved without further thought
 MEDIAN_FROM = 24  # levels; from here on clusters are halved, so that no input makes a deep tree
@@ -60,9 +67,9 @@ def pack_chooser(space: Space, bounds: Sequence[tuple[int, LightBounds]], count:
     if bounds:
         numbers = np.concatenate([first + np.arange(np.size(b.intensity)) for first, b in bounds])
         nodes = build_nodes(*gathered([b for _, b in bounds]), numbers)
-        words = nodes.view(np.int64)
-        leaves = np.flatnonzero(words[:, CHILD] < 0)
-        leaf_of[words[leaves, LIGHT_OF]] = leaves
+        children = nodes.view(np.int32)[:, CHILDREN : CHILDREN + WIDTH]
+        node, lane = np.nonzero((children < 0) & (nodes.view(np.float32)[:, SIZE : SIZE + WIDTH] > 0))
+        leaf_of[-1 - children[node, lane]] = WIDTH * node + lane
         link(row, NODES, space.array(nodes))
     apart = np.flatnonzero(leaf_of[:count] < 0)
     link(row, LEAF_OF, space.array(leaf_of))
@@ -88,21 +95,60 @@ def build_nodes(lower: np.ndarray, upper: np.ndarray, cones: Cones, numbers: np.
     """The nodes' rows, (m, NODE_WORDS) float64, for lights with these boxes, cones and numbers."""
     tree = grow_tree(lower, upper, _Cut(cones))
     bound, mean = merge_up(tree, cones, moments_of(lower, upper, cones))
-    nodes = aligned((len(tree.child), NODE_WORDS), np.float64)
-    farthest = np.maximum(tree.upper - mean.center, mean.center - tree.lower)
-    nodes[:, CENTER : CENTER + 3], nodes[:, CENTER + 3] = mean.center, mean.weight
-    nodes[:, VARIANCE : VARIANCE + 3] = mean.variance
-    nodes[:, VARIANCE + 3] = (farthest**2).sum(axis=1) * (1.0 + 1e-12)
-    nodes[:, MEAN : MEAN + 3] = mean.normal
-    nodes[:, MEAN + 3] = np.maximum(1.0 - (mean.normal**2).sum(axis=1), 0.0) / 3.0
-    nodes[:, AXIS : AXIS + 3], nodes[:, AXIS + 3] = bound.axis, np.cos(bound.spread)
-    nodes[:, COS_NORMALS], nodes[:, SIN_NORMALS] = np.cos(bound.normals), np.sin(bound.normals)
-    words = nodes.view(np.int64)
-    inner = np.flatnonzero(~tree.leaf)
-    words[:, CHILD], words[:, SIZE] = tree.child, tree.size
-    words[tree.child[inner], PARENT] = words[tree.child[inner] + 1, PARENT] = inner
-    words[:, LIGHT_OF] = np.where(tree.leaf, numbers[tree.order[tree.first]], -1)
+    roots, children = widened(tree)
+    nodes = aligned((len(roots), NODE_WORDS), np.float64)
+    single, whole = nodes.view(np.float32), nodes.view(np.int64)
+
+    # Measure from the middle of each node, in units of its size.
+    low, high = tree.lower[roots], tree.upper[roots]
+    unit = np.maximum((high - low).max(axis=1), 1e-9 * np.abs(high + low).max(axis=1) + 1e-30)
+    nodes[:, ORIGIN : ORIGIN + 3], nodes[:, ORIGIN + 3] = 0.5 * (low + high), 1.0 / unit
+
+    there = children >= 0
+    of = np.where(there, children, 0)
+    middle = (mean.center[of] - nodes[:, None, ORIGIN : ORIGIN + 3]) / unit[:, None, None]
+    farthest = np.maximum(tree.upper[of] - mean.center[of], mean.center[of] - tree.lower[of])
+    radius = np.linalg.norm(farthest, axis=-1) / unit[:, None]
+    weight = np.where(there, mean.weight[of], 0.0)
+    weight = weight / np.maximum(weight.max(axis=1, keepdims=True), 1e-300)
+    for first, values in ((CENTER, middle), (VARIANCE, mean.variance[of] / unit[:, None, None] ** 2),
+                          (MEAN, mean.normal[of]), (AXIS, bound.axis[of])):  # fmt: skip
+        single[:, first : first + 3 * WIDTH] = values.transpose(0, 2, 1).reshape(len(roots), -1)
+    for first, value in (
+        (RADIUS, radius * (1.0 + WIDER) + AROUND), (WEIGHT, weight),
+        (SCATTER, np.maximum(1.0 - (mean.normal[of] ** 2).sum(axis=-1), 0.0) / 3.0),
+        (COS_NORMALS, np.cos(bound.normals[of])), (SIN_NORMALS, np.sin(bound.normals[of])),
+        (EDGE, np.cos(bound.spread[of]) - EDGEWISE), (SIZE, np.where(there, tree.size[of], 0)),
+    ):  # fmt: skip
+        single[:, first : first + WIDTH] = value
+
+    # Say who the children are, and to them who their parent is.
+    number = np.full(len(tree.child), -1)
+    number[roots] = np.arange(len(roots))
+    light = numbers[tree.order[tree.first[of]]]
+    nodes.view(np.int32)[:, CHILDREN : CHILDREN + WIDTH] = np.where(tree.leaf[of], -1 - light, number[of])
+    whole[:, PARENT] = -1
+    node, lane = np.nonzero(there & ~tree.leaf[of])
+    whole[number[of[node, lane]], PARENT] = WIDTH * node + lane
     return nodes
+
+
+def widened(tree: Tree) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of a binary tree that stay when three levels become one: their numbers, (m,), and children, (m, 8), or -1.
+
+    The root comes first. A tree of one leaf has a node with one child.
+    """
+    roots, children, level = [], [], np.zeros(1, np.int64)
+    while len(level):
+        below = level[:, None]
+        for _ in range(3):
+            opened = (below >= 0) & ~tree.leaf[below]
+            first = np.where(opened, tree.child[below], below)
+            below = np.stack([first, np.where(opened, first + 1, -1)], axis=-1).reshape(len(level), -1)
+        roots.append(level)
+        children.append(below)
+        level = below[(below >= 0) & ~tree.leaf[below]]
+    return np.concatenate(roots), np.concatenate(children)
 
 
 def soft_positive(x: np.ndarray, variance: np.ndarray) -> np.ndarray:

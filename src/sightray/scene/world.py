@@ -12,6 +12,7 @@ from sightray.accelerators.item import (
     LIGHT,
     LIGHT_STEP,
     MATERIAL,
+    PATTERNED,
     ItemHit,
     item_at,
     item_surface,
@@ -60,7 +61,7 @@ class Point(NamedTuple):
     where: Where
     light: i64  # number of the light whose surface this is, or -1
     tangent: Vec3  # derivative of the point by u, metres
-    flags: i64  # what the material is beside a plain surface: CUTOUT, BUMPY, ORIENTED, CLEAR
+    flags: i64  # what the material is beside a plain surface: CUTOUT, BUMPY, ORIENTED, CLEAR, ...
 
 
 @kernel
@@ -126,13 +127,15 @@ def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3, beam: Beam) -> Point:
     s = item_surface(item, hit, p_object)
     shading = normalize(s.shading)
     material, flags = table_at(item, MATERIAL), i64_at(item, ITEM_FLAGS)
-    stretch = length(s.tangent)
     n = normalize(s.normal)
-    slant = max(abs(dot(n, d)), SLANT)  # a footprint is long where a surface is seen at a slant
-    width = (beam.width + beam.spread * hit.t) / (stretch * slant) if stretch > 0.0 else 0.0
-    where = Where(s.u, s.v, p_object, normal_in_object_at(item, s.normal, o.w), width, beam.bands)
-    if flags & BUMPY != 0:
-        shading = bent(shading, s.tangent, bent_normal(material, where, stretch))
+    where = Where(s.u, s.v, p_object, n, 0.0, beam.bands)
+    if flags & (PATTERNED | BUMPY) != 0:
+        stretch = length(s.tangent)
+        slant = max(abs(dot(n, d)), SLANT)  # a footprint is long where a surface is seen at a slant
+        width = (beam.width + beam.spread * hit.t) / (stretch * slant) if stretch > 0.0 else 0.0
+        where = Where(s.u, s.v, p_object, normal_in_object_at(item, s.normal, o.w), width, beam.bands)
+        if flags & BUMPY != 0:
+            shading = bent(shading, s.tangent, bent_normal(material, where, stretch))
     light = i64_at(item, LIGHT) + i64_at(item, LIGHT_STEP) * hit.prim
     return Point(
         p, n, shading, -dot(shading, d), material, where, light, s.tangent, flags,

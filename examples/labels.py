@@ -119,6 +119,70 @@ def conventions() -> Image.Image:
     return canvas
 
 
+def more_conventions() -> Image.Image:
+    """A drawing of the world and normals, texture coordinates, poses, flow and boxes, and the times of rows."""
+    canvas = Image.new("RGB", (980, 240), "white")
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(13)
+    red, green, blue, grey, pale = "#c03020", "#208030", "#2050c0", "#8899aa", "#eef2f7"
+
+    def arrow(
+        a: tuple[float, float], b: tuple[float, float], color: str, text: str = "", beside: tuple = (0, 0)
+    ) -> None:
+        draw.line([a, b], color, 2)
+        d = np.subtract(b, a) / np.linalg.norm(np.subtract(b, a))
+        side = 4 * np.array([-d[1], d[0]])
+        draw.polygon([tuple(b + 8 * d), tuple(b + side), tuple(b - side)], color)
+        draw.text(tuple(b + 15 * d + beside), text, color, font, anchor="mm")
+
+    def caption(x: float, text: str) -> None:
+        draw.text((x, 220), text, "black", font, anchor="mm")
+
+    # The world, and the outer side of a triangle.
+    arrow((40, 150), (40, 80), green, "y")
+    arrow((40, 150), (100, 150), red, "x")
+    arrow((40, 150), (18, 182), blue, "z")
+    draw.polygon([(80, 110), (150, 120), (118, 60)], pale, grey)
+    for (x, y), name in (((74, 118), "0"), ((158, 124), "1"), ((118, 50), "2")):
+        draw.text((x, y), name, grey, font, anchor="mm")
+    arrow((116, 98), (138, 84), "black", "n")
+    caption(96, "corners seen from outside")
+
+    # Texture coordinates.
+    draw.rectangle([215, 70, 315, 150], pale, grey)
+    draw.text((270, 82), "bitmap row 0", grey, font, anchor="mm")
+    arrow((215, 150), (300, 150), red, "u")
+    arrow((215, 150), (215, 80), blue, "v")
+    caption(265, "v runs upward")
+
+    # Poses.
+    for x, y, name in ((390, 150, "world"), (470, 60, "camera"), (550, 150, "object")):
+        draw.ellipse([x - 4, y - 4, x + 4, y + 4], "black")
+        draw.text((x, y + (15 if y > 100 else -15)), name, "black", font, anchor="mm")
+    arrow((466, 66), (400, 139), blue)
+    draw.text((428, 100), "world_from_camera", blue, font, anchor="rm")
+    arrow((543, 142), (480, 71), red)
+    draw.text((515, 100), "camera_from_object", red, font, anchor="lm")
+    caption(470, "a_from_b @ point in b")
+
+    # Flow, and a box around one pixel.
+    for column in range(5):
+        for row in range(3):
+            draw.rectangle([680 + 24 * column, 70 + 24 * row, 704 + 24 * column, 94 + 24 * row], pale, grey)
+    draw.rectangle([752, 94, 776, 118], None, red, 2)
+    draw.text((764, 58), "3   4", red, font, anchor="mm")
+    arrow((692, 82), (726, 120), blue, "x1 - x0", (14, 10))
+    caption(740, "a box; flow")
+
+    # The rows of a rolling shutter.
+    for row in range(5):
+        x, y = 860 + 12 * row, 70 + 18 * row
+        draw.rectangle([x, y, x + 40, y + 12], pale, grey)
+        draw.line([x + 20, y, x + 20, y + 12], red, 2)
+    arrow((856, 172), (945, 172), "black", "t")
+    caption(905, "rows and times")
+    return canvas
+
+
 def main(folder: Path) -> None:
     now, after, right = room(), room(1.0), room(step=0.15)
     for name, scene in (("room", now), ("room_next", after), ("room_right", right)):
@@ -129,6 +193,7 @@ def main(folder: Path) -> None:
         if labels.about(name).picture:
             labels.picture(name).save(folder / f"{name}.png", compression=9)
     conventions().save(folder / "conventions.png", optimize=True)
+    more_conventions().save(folder / "more_conventions.png", optimize=True)
     print(folder)
 
 

@@ -17,11 +17,15 @@ import pytest
 from PIL import Image
 
 import sightray as sr
+import sightray.scene.compile as compile_module
 from sightray.errors import FormatError, SceneError
+from sightray.scene.compile import Compiled
 from sightray.vision.dataset import make_dataset
 from sightray.vision.marks import read_mark, write_frame
 from sightray.vision.photograph import photograph
 from sightray.vision.recipe import load_recipe
+from sightray.vision.writers.base import as_writer
+from sightray.vision.writers.exr import ExrWriter
 
 RECIPE = """
 seed: 3
@@ -269,6 +273,55 @@ def test_motion_blur_is_in_the_picture_and_not_in_the_labels(tmp_path):
     assert error < 0.3 * np.abs(still.image.pixels - mean).mean()
 
 
+def test_labels_and_pictures_of_all_cameras_share_the_tables_of_their_scene(tmp_path, monkeypatch):
+    """Two cameras, with flow: the tables of two moments, one of which the next frame finds made; pictures bit for bit those
+    of `render`."""
+    made = []
+    monkeypatch.setattr(compile_module, "Compiled", lambda *a: made.append(a) or Compiled(*a))
+    recipe = load_recipe(write_recipe(tmp_path, SEQUENCE))
+    writers = [as_writer("kitti")]
+    takes = [recipe.take(k) for k in range(2)]
+    left, right = photograph(takes[0], writers, 2)
+    assert len(made) == 2
+    photograph(takes[1], writers, 2)
+    assert len(made) == 3
+    for shot, seed in ((left, takes[0].seeds[0]), (right, takes[0].seeds[1])):
+        alone = sr.render(
+            takes[0].scene.replace(camera=shot.labels.camera), samples=2, seed=seed, filter=sr.BoxFilter()
+        )
+        assert (shot.image.pixels == alone.pixels).all()
+        depth = sr.label(takes[0].scene, "instance", camera=shot.labels.camera).instance
+        assert (shot.labels.instance == depth).all()
+    assert (left.image.pixels != right.image.pixels).any()
+
+
+def test_a_rolling_shutter_is_in_pictures_and_labels(tmp_path):
+    """Row by row the labels of the moment of that row; a format with one pose for each picture refuses."""
+    text = SEQUENCE.replace("sequence:", "readout: 0.04\nsequence:").replace("speed: 40", "speed: 200")
+    path = write_recipe(tmp_path, text.replace(", shake: {position: 0.002, degrees: 0.1, low: 0.5, high: 4}", ""))
+    recipe = load_recipe(path)
+    take = recipe.take(1)
+    shots = photograph(take, [ExrWriter(names="instance,ray_origin,ray_direction")], 1)
+    animation = recipe.stage(0).animation
+    middle = sr.label(animation.at(take.time), "instance", "depth")
+    assert (shots[0].labels.instance != middle.instance).any()
+    same, total = 0, 0
+    for row in range(0, 32, 5):
+        then = animation.at(take.time + 0.04 * ((row + 0.5) / 32 - 0.5))
+        still = sr.label(then, "instance", "ray_origin", "ray_direction")
+        for name in ("ray_origin", "ray_direction"):  # chords stand in for arcs: a millimetre of a decimetre
+            assert np.abs(shots[0].labels[name][row] - still[name][row]).max() <= 2e-3
+        same += (shots[0].labels.instance[row] == still.instance[row]).sum()
+        total += 40
+    assert same >= 0.98 * total
+    assert np.ptp(shots[0].labels.ray_origin[..., 0]) + np.ptp(shots[0].labels.ray_origin[..., 2]) > 0.05
+    met = shots[0].labels.instance >= 0
+    assert np.isfinite(shots[0].labels.flow[met]).mean() > 0.9
+    with pytest.raises(SceneError, match="kitti: camera: got a MovingCamera; allowed: pinholes"):
+        make_dataset(path, tmp_path / "data", frames=1, formats=["kitti"])
+    make_dataset(path, tmp_path / "data", frames=1, samples=1, formats=["coco", "exr"])
+
+
 # ---------------------------------------------------------------------------------------------------------- what goes wrong
 
 
@@ -280,6 +333,7 @@ def test_motion_blur_is_in_the_picture_and_not_in_the_labels(tmp_path):
     ("brick.obj", "brock.obj", "no such file; did you mean 'brick.obj'"),
     ("{type: PerspectiveCamera, vfov: {uniform: [35, 50]}, width: 40, height: 32}", "", "camera: missing"),
     ("view: {", "view: {distnace: 2, ", "view: unknown key 'distnace'; did you mean 'distance'"),
+    ("seed: 3", "seed: 3\nreadout: -1", "readout: got -1; allowed: a finite number >= 0"),
     ("seed: 3", "seed: -3", "seed: got -3; allowed: a whole number from 0"),
     ("seed: 3", "seed: 3\nformats: [cocoa]", "unknown format 'cocoa'; did you mean 'coco'"),
     ("name: floor", "name: floor, radius: 3", "unknown field 'radius' for Plane"),
@@ -384,8 +438,6 @@ def test_a_worker_that_dies_is_told(recipe, tmp_path, monkeypatch):
 
 def test_frames_can_be_written_one_by_one(recipe, tmp_path):
     """What `make_dataset` does, by hand."""
-    from sightray.vision.writers.base import as_writer
-
     loaded, writers = load_recipe(recipe), [as_writer("coco")]
     mark = write_frame(tmp_path / "d", photograph(loaded.take(1), writers, 0), writers)
     assert set(mark["files"]) == {"coco/images/000001.png", "coco/panoptic/000001.png"}

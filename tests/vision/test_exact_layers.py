@@ -62,6 +62,57 @@ def test_e2_distances_of_a_sphere_and_a_plane_against_closed_forms(camera):
     np.testing.assert_allclose(floor, np.where(t > 0, t, np.inf), rtol=1e-12)
 
 
+QUADRIC = sr.Quadric(a=1.0, b=0.5, c=0.8, d=0.3, e=-0.2, f=0.1, g=0.2, h=-0.1, i=0.4, j=-1.2,
+                     lower=(-3, -3, -3), upper=(3, 3, 3))  # fmt: skip
+
+
+def first_root(coefficients: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """The root near t of polynomials, highest power first, (n, degree + 1): Newton's method in extended precision."""
+    t = np.asarray(t, np.longdouble)
+    for _ in range(6):
+        value, slope = np.zeros_like(t), np.zeros_like(t)
+        for c in coefficients.T:
+            value, slope = value * t + c, slope * t + value
+        t = t - value / slope
+    return t.astype(float)
+
+
+@pytest.mark.parametrize("camera", EVERY)
+@pytest.mark.parametrize("shape", [QUADRIC, sr.Torus(major_radius=0.9, minor_radius=0.35)], ids=["quadric", "torus"])
+def test_e2_distances_of_a_quadric_and_a_torus_against_their_polynomials(camera, shape):
+    """The least positive root of the ray's own polynomial: by eigenvalues, polished in extended precision."""
+    labels = sr.label(scene(camera, shape), "distance", "normal")
+    o, d = (v.reshape(-1, 3).astype(np.longdouble) for v in camera.rays(centres(camera)))
+    if isinstance(shape, sr.Torus):
+        oo, od = (o * o).sum(-1), (o * d).sum(-1)  # (|p|² + R² - r²)² = 4 R² (x² + z²), |d| = 1
+        k, four = oo + np.longdouble(0.9) ** 2 - np.longdouble(0.35) ** 2, 4 * np.longdouble(0.9) ** 2
+        across = [d[:, 0] ** 2 + d[:, 2] ** 2, 2 * (o[:, 0] * d[:, 0] + o[:, 2] * d[:, 2]), o[:, 0] ** 2 + o[:, 2] ** 2]
+        terms = [np.ones_like(k), 4 * od, 4 * od * od + 2 * k - four * across[0], 4 * k * od - four * across[1],
+                 k * k - four * across[2]]  # fmt: skip
+    else:
+        q = np.array([[shape.a, shape.d / 2, shape.e / 2], [shape.d / 2, shape.b, shape.f / 2],
+                      [shape.e / 2, shape.f / 2, shape.c]], np.longdouble)  # fmt: skip
+        along = np.array([shape.g, shape.h, shape.i], np.longdouble)
+        terms = [
+            ((d @ q) * d).sum(-1),
+            2 * ((o @ q) * d).sum(-1) + d @ along,
+            ((o @ q) * o).sum(-1) + o @ along + shape.j,
+        ]
+    coefficients = np.stack(terms, axis=1)
+    found = labels.distance.ravel()
+    expected = np.full(len(o), np.inf)
+    for i in np.flatnonzero(d.any(axis=1)):
+        roots = np.roots(coefficients[i].astype(float))
+        real = roots.real[(np.abs(roots.imag) < 1e-7) & (roots.real > 1e-9)]
+        if len(real):
+            expected[i] = first_root(coefficients[i : i + 1], real.min()[None])[0]
+    hit = np.isfinite(found)
+    clear = hit & (np.abs((labels.normal.reshape(-1, 3) * d).sum(-1)) > 0.05)  # a grazing ray's root has fewer digits
+    assert clear.sum() > 30
+    np.testing.assert_allclose(found[clear], expected[clear], rtol=1e-12)
+    assert (np.isfinite(expected) != hit).mean() < 0.005  # where the ray touches
+
+
 @pytest.mark.parametrize("camera", EVERY)
 def test_e2_distance_is_depth_times_the_length_of_the_line_of_sight(camera):
     if not is_linear(camera):
@@ -85,6 +136,61 @@ def test_normals_are_gradients_and_turn_with_the_camera(camera):
     np.testing.assert_allclose(
         labels.position_camera[met], (labels.position[met] - pose[:3, 3]) @ pose[:3, :3], atol=1e-12
     )
+
+
+ROUND = {
+    "sphere": sr.Sphere(center=(0.3, -0.2, 0.1), radius=0.7),
+    "disk": sr.Disk(center=(0.2, 0.1, -0.3), normal=(1, 2, -1), radius=0.6),
+    "cone": sr.Cone(base=(0.1, -0.4, 0.2), top=(0.5, 0.6, -0.3), base_radius=0.5, top_radius=0.2),
+    "cylinder": sr.Cylinder(base=(0.1, -0.4, 0.2), top=(0.5, 0.6, -0.3), radius=0.35),
+    "torus": sr.Torus(center=(0.1, 0.2, 0), axis=(1, 1, 0.5), major_radius=0.6, minor_radius=0.2),
+    "rectangle": sr.Rectangle(corner=(0.1, 0.2, 0.3), edge_u=(0.5, 0.2, 0), edge_v=(-0.1, 0.4, 0.3)),
+    "triangle": sr.Triangle(a=(0, 0, 0), b=(1, 0.3, 0.1), c=(0.2, 0.8, -0.4)),
+    "polygon": sr.Polygon(outline=[(0, 0, 0), (1, 0, 0.5), (1, 1, 0.5), (0.5, 0.4, 0.25), (0, 1, 0)]),
+    "box": sr.Box(lower=(-0.2, 0, 0.1), upper=(0.5, 0.3, 0.9)),
+}
+
+
+@pytest.mark.parametrize("kind", ROUND)
+def test_boxes_in_space_are_tight_in_turned_groups_too(kind):
+    """Of 20 000 rays along each axis, both ways, none meets the turned shape beyond its box, and some do near each side."""
+    turn = sr.Transform.rotate((1, 2, 3), 50) @ sr.Transform.scale(1.0, 1.6, 0.7)
+    group = sr.Group(objects=[ROUND[kind].replace(transform=turn)], name="group")
+    labels = sr.label(sr.Scene(group, camera=every_camera()["PerspectiveCamera"]), "boxes_3d")
+    thing = labels.objects[0]
+    size = (thing.upper - thing.lower).max()
+    start = np.random.default_rng(5).uniform(thing.lower, thing.upper, (20_000, 3))
+    found = []
+    for axis in range(3):
+        for way in (1, -1):
+            o, d = start.copy(), np.zeros(3)
+            o[:, axis], d[axis] = (thing.lower - 3 * size)[axis] if way > 0 else (thing.upper + 3 * size)[axis], way
+            hits = sr.Scene(group).intersect(o, d)
+            met = np.isfinite(hits.t)
+            found.append(o[met] + hits.t[met, None] * d)
+    found = np.concatenate(found)
+    assert (found >= thing.lower - 1e-9).all()
+    assert (found <= thing.upper + 1e-9).all()
+    slack = 0.03 * size  # corners of flat shapes are met by few rays
+    assert (found.min(axis=0) <= thing.lower + slack).all()
+    assert (found.max(axis=0) >= thing.upper - slack).all()
+
+
+def test_amodal_boxes_may_reach_beyond_the_picture():
+    """Of a ball that the left edge cuts, the whole outline as the camera's cone sees it; within the picture, the same."""
+    camera = sr.PinholeCamera(fx=60, width=64, height=48)
+    ball = sr.Sphere(center=(-2.0, 0.1, 4), radius=0.7, name="ball")
+    room = sr.Scene(ball, sr.Sphere(center=(0.5, 0, 4), radius=0.3), camera=camera)
+    inside = sr.label(room, "amodal_boxes").amodal_boxes
+    whole = sr.label(room, sr.AmodalBoxesLayer(beyond=True)).amodal_boxes
+    np.testing.assert_array_equal(inside[1], whole[1])
+    assert whole[0, 0] < inside[0, 0] == 0
+    np.testing.assert_array_equal(np.clip(whole[0], 0, (64, 48, 64, 48)), inside[0])
+    x, _, z = (np.linalg.inv(camera.world_from_camera()) @ (*ball.center, 1))[:3]
+    heading, half = np.arctan2(x, z), np.arcsin(0.7 / np.hypot(x, z))
+    left, right = 32 + 60 * np.tan(heading - half), 32 + 60 * np.tan(heading + half)
+    assert left - 0.5 <= whole[0, 0] <= left + 1.5
+    assert right - 1.5 <= whole[0, 2] <= right + 0.5
 
 
 def test_e2_points_of_meshes_are_told_by_their_triangles():

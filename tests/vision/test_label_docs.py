@@ -58,6 +58,20 @@ def test_pictures_are_what_the_commands_make(name):
     assert (np.abs(made - shown).max(axis=-1) > 0.02).mean() < 1e-3
 
 
+def test_conventions_name_tests_that_exist_and_show_figures():
+    text = (ROOT / "docs" / "conventions.md").read_text(encoding="utf-8")
+    tests = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    lines = [line for line in text.splitlines() if line.startswith("| ") and not line.startswith("| what ")]
+    assert len(lines) > 30
+    for line in lines:
+        named = re.findall(r"`(test_\w+)`", line)
+        assert named, line
+        for name in named:
+            assert f"def {name}(" in tests, name
+    for figure in re.findall(r"\]\((images/\S+)\)", text):
+        assert (ROOT / "docs" / figure).exists(), figure
+
+
 def test_code_runs(tmp_path, monkeypatch, forget_slant):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")

@@ -7,6 +7,8 @@ import pytest
 from label_scenes import BALL, CRATE, EGG, FLOOR, RING, centres, every_camera, moved, scene
 
 import sightray as sr
+from sightray.scene.instance import moves
+from sightray.vision.poses import object_pose
 
 EVERY = [pytest.param(camera, id=name) for name, camera in every_camera().items()]
 TURN = sr.Transform.translate(0.1, 0.05, -0.1) @ sr.Transform.rotate((0, 1, 0.2), 12)
@@ -324,7 +326,88 @@ def test_e9_rolling_shutter_labels_come_from_rays_at_their_own_times():
     middle = sr.label(room.at(0.25), "instance").instance
     assert (labels.instance != middle).any()
     with pytest.raises(sr.UnsupportedError, match="objects move under a rolling shutter"):
-        sr.label(room, "flow", next=0.1)
+        sr.label(room, "mirrored_flow", next=0.1)
+
+
+ROLLING = every_camera()["PerspectiveCamera"].replace(readout=0.3)
+
+
+def time_of_row(y, start: float = 0.0) -> float:
+    return start + y / ROLLING.height * 0.3
+
+
+@pytest.mark.parametrize("carried", [False, True], ids=["camera stands", "camera moves"])
+def test_e9_flow_of_what_moves_under_a_rolling_shutter_leads_to_the_same_material_point(carried):
+    """The ray of the other picture through x + u, cast at its own row's time, meets that very point of the object."""
+    poses = [(0.0, ROLLING.world_from_camera()), (1.0, aside(ROLLING, (0.3, 0.1, -0.2)).world_from_camera())]
+    camera = sr.MovingCamera(camera=ROLLING, poses=poses) if carried else ROLLING
+    room = scene(camera, *spinning())
+    labels = sr.label(
+        room, "flow", "occlusion", "out_of_view", "instance", "object_position", "next_position", next=0.25
+    )
+    later = labels.views["next"].camera
+    seen = (labels.instance >= 0) & ~labels.occlusion & ~labels.out_of_view
+    checked = dict.fromkeys(np.unique(labels.instance[seen]), 0)
+    for row, column in np.argwhere(seen)[::23]:
+        index, pixel = labels.instance[row, column], np.array([column, row]) + 0.5 + labels.flow[row, column]
+        time = time_of_row(pixel[1], 0.25)
+        o, d = later.rays(pixel)
+        then = room.at(time)
+        hit = then.intersect(o, d)
+        assert hit.shape == index
+        point = o + hit.t * d
+        assert np.abs(point - labels.next_position[row, column]).max() <= 1e-7
+        back = np.linalg.inv(object_pose(then.objects[index]))
+        inside = back[:3, :3] @ point + back[:3, 3]
+        assert np.abs(inside - labels.object_position[row, column]).max() <= 1e-7
+        checked[index] += 1
+    assert min(checked.values()) >= 1
+    assert len(checked) >= 3
+    assert labels.occlusion.any()
+    hidden = np.argwhere((labels.instance >= 0) & labels.occlusion)
+    for row, column in hidden[:: len(hidden) // 8 + 1]:
+        pixel = np.array([column, row]) + 0.5 + labels.flow[row, column]
+        o, d = later.rays(pixel)
+        way = np.linalg.norm(labels.next_position[row, column] - o)
+        assert room.at(time_of_row(pixel[1], 0.25)).intersect(o, d).t < way * (1 - 1e-7)
+
+
+def test_e9_layers_of_objects_under_a_rolling_shutter_are_those_of_each_rows_own_time():
+    room = scene(ROLLING, *spinning())
+    names = ("amodal_masks", "object_position", "object_coordinates", "surfaces")
+    labels = sr.label(room, *names)
+    for row in (3, 11, 17, 25):
+        then = room.at(time_of_row(row + 0.5)).replace(camera=ROLLING.replace(readout=0.0))
+        still = sr.label(then, *names)
+        assert (labels.amodal_masks[:, row] == still.amodal_masks[:, row]).all()
+        np.testing.assert_allclose(labels.object_position[row], still.object_position[row], atol=1e-9)
+        a, b = (slice(*part.surfaces.offsets[[row * 41, row * 41 + 41]]) for part in (labels, still))
+        np.testing.assert_allclose(labels.surfaces.distance[a], still.surfaces.distance[b], atol=1e-9)
+        assert (labels.surfaces.instance[a] == still.surfaces.instance[b]).all()
+    middle = sr.label(room.at(0.15).replace(camera=ROLLING.replace(readout=0.0)), "poses", "object_coordinates")
+    np.testing.assert_allclose(sr.label(room, "poses").poses, middle.poses, atol=1e-12)
+    met = np.isfinite(labels.object_coordinates).all(axis=-1)
+    assert met.any()
+    assert ((labels.object_coordinates[met] >= 0) & (labels.object_coordinates[met] <= 1)).all()
+
+
+def test_e9_keypoints_of_what_moves_are_where_their_rows_find_them():
+    room = scene(ROLLING, *spinning())
+    moving = next(thing for thing in room.objects if moves(thing))
+    ways = np.random.default_rng(4).normal(size=(40, 3))
+    points = BALL.center + BALL.radius * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    found = sr.label(room, "keypoints", keypoints={moving.name: points}).keypoints[moving.name]
+    index = room.objects.index(moving)
+    assert np.isfinite(found).all()
+    for (x, y, visibility), inside in zip(found, points, strict=True):
+        then = room.at(time_of_row(y))
+        pose = object_pose(then.objects[index])
+        point = pose[:3, :3] @ inside + pose[:3, 3]
+        assert np.abs(ROLLING.replace(readout=0.0).project(point) - (x, y)).max() <= 1e-9
+        o, d = ROLLING.rays(np.array([x, y]))
+        clear = then.intersect(o, d).t >= np.linalg.norm(point - o) * (1 - 1e-6)
+        assert (visibility == 2) == bool(clear)
+    assert set(found[:, 2]) == {1, 2}
 
 
 def test_e9_flow_of_a_still_scene_under_a_rolling_shutter_projects_to_the_row_that_sees_it():

@@ -74,25 +74,27 @@ class Animation:
         objects = self.objects_at(t) if self.objects else self.scene.objects
         return self.scene.replace(objects=objects, camera=next(iter(self.cameras_at(t).values())))
 
-    def blurred(self, t: float, exposure: float) -> dict[str, Scene]:
-        """By camera, the scene that a shutter sees that is open for `exposure` seconds around t: all of it in motion.
+    def blurred(self, t: float, exposure: float, readout: float = 0.0) -> tuple[Scene, dict[str, Camera]]:
+        """What a shutter sees that is open for `exposure` seconds around t: the scene, and cameras by name, in motion.
 
-        Within the exposure, objects and cameras go from their poses at its begin to those at t, and on to those at its
-        end. Labels of the middle of the exposure are those of `at`.
+        With `readout`, the bottom row is exposed so many seconds after the top one, and the picture's middle row around t.
+        In that time, objects and cameras go from their poses at its begin to those at t, and on to those at its end.
+        Labels of the middle of the exposure are those of `at`.
         """
-        times = (t - 0.5 * exposure, t, t + 0.5 * exposure)
+        half = 0.5 * (exposure + readout)
+        times = (t - half, t, t + half)
         objects = tuple(
             Instance(of=thing, motion=Motion([(s, self.objects[name].pose(s)) for s in times]), name=name)
             if (name := getattr(thing, "name", "")) in self.objects else thing
             for thing in self.scene.objects
         )  # fmt: skip
         cameras = [self.cameras_at(s) for s in times]
-        found = {}
+        found: dict[str, Camera] = {}
         for name, still in cameras[1].items():
             poses = Motion([(s, there[name].world_from_camera()) for s, there in zip(times, cameras, strict=True)])
-            camera = MovingCamera(camera=still.replace(shutter_open=times[0], shutter_close=times[2]), poses=poses)
-            found[name] = self.scene.replace(objects=objects, camera=camera)
-        return found
+            rows = {"shutter_open": times[0], "shutter_close": times[0] + exposure, "readout": readout}
+            found[name] = MovingCamera(camera=still.replace(**rows), poses=poses)
+        return self.scene.replace(objects=objects, camera=next(iter(found.values()))), found
 
 
 def moved(thing: Any, pose: Any) -> Any:

@@ -5,11 +5,15 @@ Reference: R. Hartley, A. Zisserman, Multiple View Geometry, 2nd ed. 2003, chapt
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
 
 from sightray.errors import SceneError
+from sightray.vision.legend import Swatches
+from sightray.vision.masks import backdrop, draw_line
+from sightray.vision.pictures import Painting, palette, title
 from sightray.vision.view import View, is_linear
 
 
@@ -36,3 +40,30 @@ def require_pinhole(view: View) -> Any:
     if not is_linear(view.camera):
         raise SceneError(f"label: {type(view.camera).__name__} is no pinhole; epipolar geometry needs pinholes")
     return view.intrinsics
+
+
+def marked_pixels(view: View, count: int = 7) -> np.ndarray:
+    """Pixels of a picture for which lines are drawn, (n, 2): along its diagonal."""
+    shares = (np.arange(count) + 0.5) / count
+    return np.stack([shares * view.camera.width, shares * view.camera.height], axis=1)
+
+
+def paint_pencil(labels: Any, layer: Any, normals: np.ndarray) -> Painting:
+    """Epipolar lines over what is seen: where planes through the eye with these normals, (n, 3) in the camera's frame, are
+    seen by the picture; with distortion they are curves."""
+    pixels = backdrop(labels, palette(len(labels.objects)))
+    colors = palette(len(normals))
+    angles, pose = np.linspace(0, 2 * np.pi, 721), labels.world_from_camera
+    for color, normal in zip(colors, normals, strict=True):
+        across, along, _ = np.linalg.svd(normal[None])[2][[1, 2, 0]]
+        ways = np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * along
+        with np.errstate(invalid="ignore", divide="ignore"):
+            seen = labels.camera.project(ways @ pose[:3, :3].T + pose[:3, 3])
+        reach = 2 * max(labels.width, labels.height)
+        seen[np.abs(seen).max(axis=1) > reach] = np.nan
+        for a, b in itertools.pairwise(seen):
+            draw_line(pixels, a, b, color)
+    places = [f"({x:.0f}, {y:.0f})" for x, y in marked_pixels(labels.views["next"], len(normals))]
+    return Painting(
+        pixels, Swatches(list(zip(colors, places, strict=True)), f"{title(layer)}: lines of points of next")
+    )

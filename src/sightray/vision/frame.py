@@ -27,8 +27,10 @@ from sightray.scene.world import FLAGS
 from sightray.shapes.mesh import Mesh
 from sightray.vision import record as words
 from sightray.vision.casting import cast_tile
+from sightray.vision.extents import extent
 from sightray.vision.layers.base import Layer, fill
-from sightray.vision.poses import object_pose, outline_points
+from sightray.vision.poses import object_pose
+from sightray.vision.rolling import Rolling
 from sightray.vision.view import Motion, View
 
 _WHITTED, _SAMPLER = Whitted(), default_sampler()
@@ -83,6 +85,7 @@ class Frame:
         self.classes, self.class_of_item = number_classes(self.compiled.items, classes)
         self.values: dict[str, Any] = {}
         self._motions: dict[str, Motion] = {}
+        self._rolling: dict[str, Rolling] = {}
 
     # ------------------------------------------------------------------------------------------------- what is there
 
@@ -103,11 +106,9 @@ class Frame:
         thing = self.view.middle.objects[index]
         pose = object_pose(thing)
         object_from_world = np.linalg.inv(pose)
-        with np.errstate(invalid="ignore"):
-            corners = [_moved(object_from_world @ item.transform.matrix, outline_points(item.shape))
-                       for item in (self.view.middle_items[k] for k in numbers)]  # fmt: skip
-        lower = np.min([c.min(axis=0) for c in corners], axis=0)
-        upper = np.max([c.max(axis=0) for c in corners], axis=0)
+        parts = (self.view.middle_items[k] for k in numbers)
+        ends = np.array([extent(item.shape, object_from_world @ item.transform.matrix) for item in parts])
+        lower, upper = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
         name = getattr(thing, "name", "") or self.compiled.items[numbers[0]].name
         category = self.classes[self.class_of_item[numbers[0]]]
         return ObjectInfo(index, name, category, type(thing).__name__, pose, lower, upper)
@@ -132,6 +133,16 @@ class Frame:
             raise SceneError(f"label: {name}: missing; give {name}=, such as a Scene with a camera")
         return view
 
+    def rolls(self, name: str) -> bool:
+        """Whether objects move while this picture's rows, or those of that view, are exposed one after the other."""
+        return self.view.blurred or self.other(name).blurred
+
+    def rolling(self, name: str) -> Rolling:
+        """How everything moved to that view, each point until the time of the row that sees it."""
+        if name not in self._rolling:
+            self._rolling[name] = Rolling(self, self.view, self.other(name))
+        return self._rolling[name]
+
     def motion(self, name: str) -> Motion:
         """How everything moved to that view; `UnsupportedError` where things move under a rolling shutter."""
         if name not in self._motions:
@@ -139,6 +150,10 @@ class Frame:
             self.other(name).require_still()
             self._motions[name] = Motion(self.view, self.other(name))
         return self._motions[name]
+
+    def partner_items(self, name: str) -> np.ndarray:
+        """For each item the one of that view that it became; -1 where it is gone."""
+        return self.rolling(name).item if self.rolls(name) else self.motion(name).item
 
     def beside(self, name: str) -> Frame:
         """That view as a picture of its own."""
@@ -173,7 +188,6 @@ class Frame:
         tables, space = self.compiled.tables, Space()
         row = self._row(space, scale, max(layer.detail for layer in layers))
         if any(layer.object_frames for layer in layers):
-            self.require_still()
             link(row, words.OBJECT_FRAMES, self._object_frames(space))
         handles, outputs = space.row(len(layers)), space.row(len(layers))
         arrays: list[np.ndarray] = []
@@ -241,14 +255,6 @@ class Frame:
                 numbers[at + 16 : at + 19] = 0.5 * (thing.lower + thing.upper)
                 numbers[at + 19] = np.linalg.norm(thing.upper - thing.lower)
         return frames
-
-
-def _moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points under an affine map; infinite coordinates stay where they are."""
-    if (matrix == np.eye(4)).all():
-        return points
-    moved = points @ matrix[:3, :3].T + matrix[:3, 3]
-    return np.where(np.isnan(moved), points, moved)
 
 
 def number_classes(items: list[Item], given: Any) -> tuple[tuple[str, ...], list[int]]:

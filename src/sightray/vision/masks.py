@@ -56,7 +56,9 @@ def paint_boxes(labels: Labels, layer: Layer) -> Painting:
     pixels = backdrop(labels, colors)
     for color, box in zip(colors, labels[layer.label], strict=True):
         if np.isfinite(box).all():
-            left, top, right, bottom = box.astype(int)
+            left, top, right, bottom = np.clip(box, 0, np.tile((labels.width, labels.height), 2)).astype(int)
+            if left >= right or top >= bottom:  # beyond the picture
+                continue
             for outline in (np.s_[top, left:right], np.s_[bottom - 1, left:right],
                             np.s_[top:bottom, left], np.s_[top:bottom, right - 1]):  # fmt: skip
                 pixels[outline] = color

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from copy import copy
 
+from sightray.cameras.base import Camera
 from sightray.engine.run import run
 from sightray.filters.box import BoxFilter
 from sightray.images import Image
 from sightray.integrators.whitted import Whitted
+from sightray.mathlib.table import link
 from sightray.samplers.base import default_sampler
-from sightray.scene.compile import compile_scene
+from sightray.scene.compile import Compiled, compile_scene
 from sightray.scene.scene import Scene
+from sightray.scene.world import CAMERA
 from sightray.vision.label import make_labels
 from sightray.vision.shot import Shot
 from sightray.vision.take import Take
+from sightray.vision.view import View
 from sightray.vision.writers.base import Writer
 
 SAFE = ("instance",)  # a layer that is always made, for labels need one
@@ -26,18 +31,23 @@ def layers_of(writers: Iterable[Writer], take: Take) -> tuple[str, ...]:
 
 
 def photograph(take: Take, writers: Iterable[Writer], samples: int, threads: int | None = None) -> list[Shot]:
-    """A picture and labels by each camera of a take; without pictures if `samples` is 0."""
+    """A picture and labels by each camera of a take; without pictures if `samples` is 0.
+
+    The tables of a scene are made once, for the labels and the pictures of all cameras.
+    """
     names, layers, shots = tuple(take.cameras), layers_of(writers, take), []
     for index, name in enumerate(names):
         camera = take.cameras[name]
         following = None
         if take.following is not None and take.later is not None:
-            following = take.following.replace(camera=take.later[name])
+            following = View(take.following, take.later[name])
         other = take.cameras[names[1 - index]] if take.stereo else None
-        scene = take.scene if take.scene.camera is camera else take.scene.replace(camera=camera)
-        labels = make_labels(scene, layers, next=following, stereo=other, classes=take.classes, threads=threads)
-        seen = scene if take.blurred is None else take.blurred[name]
-        image = picture(seen, samples, take.seeds[index], threads) if samples else None
+        labels = make_labels(take.scene, layers, camera=camera, next=following, stereo=other, classes=take.classes,
+                             threads=threads)  # fmt: skip
+        image = None
+        if samples:
+            seen, eye = (take.scene, camera) if take.blurred is None else (take.blurred, take.shutters[name])
+            image = picture(seen, eye, samples, take.seeds[index], threads)
         shots.append(Shot(
             labels, image, frame=take.frame, camera=index, cameras=names, sequence=take.sequence, step=take.step,
             time=take.time, targets=take.targets, threads=threads,
@@ -45,10 +55,18 @@ def photograph(take: Take, writers: Iterable[Writer], samples: int, threads: int
     return shots
 
 
-def picture(scene: Scene, samples: int, seed: int, threads: int | None) -> Image:
-    """The scene's picture by its own integrator, as `sightray.render` makes it."""
-    outcome = run(compile_scene(scene), scene.integrator or Whitted(), default_sampler(), BoxFilter(), samples=samples,
-                  seed=seed, threads=threads)  # fmt: skip
+def picture(scene: Scene, camera: Camera, samples: int, seed: int, threads: int | None) -> Image:
+    """The scene's picture by one of its cameras and its own integrator, as `sightray.render` makes it."""
+    outcome = run(looking(compile_scene(scene), camera), scene.integrator or Whitted(), default_sampler(), BoxFilter(),
+                  samples=samples, seed=seed, threads=threads)  # fmt: skip
     if not outcome.complete:
         raise KeyboardInterrupt
     return Image(outcome.film.image(), transfer=scene.transfer)
+
+
+def looking(compiled: Compiled, camera: Camera) -> Compiled:
+    """The compiled scene with another camera. Its tables stay the same, with room for one at a time."""
+    link(compiled.world, CAMERA, compiled.tables.row_of(camera))
+    found = copy(compiled)
+    found.scene = compiled.scene.replace(camera=camera)
+    return found

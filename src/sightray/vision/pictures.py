@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sightray.vision.layers.base import Layer
 
 NOTHING = np.array([0.13, 0.13, 0.16])  # sRGB, of pixels without a value
+HORIZON = 1e12  # metres; points of the background are farther
 MOST_NAMES = 24  # in a legend
 
 
@@ -113,7 +114,7 @@ def _place(labels: Labels, layer: Layer, values: np.ndarray) -> Painting:
     return Painting(pixels, Swatches(entries, title(layer)))
 
 
-def _shares(labels: Labels, layer: Layer, values: np.ndarray) -> Painting:
+def shares(labels: Labels, layer: Layer, values: np.ndarray) -> Painting:
     """Shares of several lights: the first three as red, green and blue; a single one as grey."""
     there = np.isfinite(values).all(axis=-1) if values.shape[-1] else np.zeros(values.shape[:2], bool)
     colors = np.eye(3) if values.shape[-1] > 1 else np.ones((1, 3))
@@ -137,12 +138,14 @@ def _direction(labels: Labels, layer: Layer, values: np.ndarray) -> Painting:
 
 
 def _box(labels: Labels, layer: Layer, values: np.ndarray) -> Painting:
-    """Points: x, y and z as red, green and blue, each between the smallest and the largest."""
-    there = np.isfinite(values).all(axis=-1)
+    """Points: x, y and z as red, green and blue, each between the smallest and the largest; nothing where they are far."""
+    with np.errstate(invalid="ignore"):
+        there = (np.abs(values) < HORIZON).all(axis=-1)
     low, high = np.zeros(3), np.ones(3)
     if there.any():
         low, high = np.percentile(values[there], (1, 99), axis=0)
     part = np.clip((values - low) / np.maximum(high - low, 1e-300), 0.0, 1.0)
+    part[..., high == low] = 0.5  # as where rays start that have one eye
     pixels = np.where(there[..., None], part, NOTHING)
     axes = np.eye(3) * 0.9 + 0.1
     ranges = [f"{c} {a:.3g} to {b:.3g}" for c, a, b in zip("xyz", low, high, strict=True)]
@@ -237,7 +240,7 @@ def _color(labels: Labels, layer: Layer, values: np.ndarray) -> Painting:
 
 Map = Callable[["Labels", "Layer", Any], Painting]
 MAPS: dict[str, Map] = {
-    "heat": _heat, "share": _share, "share_of_most": _share_of_most, "vector": _vector, "shares": _shares, "place": _place,
+    "heat": _heat, "share": _share, "share_of_most": _share_of_most, "vector": _vector, "shares": shares, "place": _place,
     "direction": _direction, "box": _box, "cube": _cube, "square": _square,
     "categories": _categories, "numbers": _numbers, "flow": _flow, "mask": _mask, "color": _color,
 }  # fmt: skip

@@ -46,6 +46,7 @@ KEYS = (
     "formats",
     "sequence",
     "exposure",
+    "readout",
     "scene",
     "ground",
     "place",
@@ -71,6 +72,7 @@ class Recipe:
     formats : tuple of Writer, as the recipe says, else coco and exr.
     length, rate : frames in a sequence, and in a second.
     exposure : seconds for which the shutter is open; 0 for pictures of an instant.
+    readout : seconds from the top row's exposure to the bottom row's, a rolling shutter; 0 for all rows at once.
 
     Raises
     ------
@@ -93,6 +95,7 @@ class Recipe:
         self.length = self.values.whole(sequence, "length", 1, 1, 10**9)
         self.rate = self.values.number(sequence, "rate", 10.0, above=0.0)
         self.exposure = self.values.number(top, "exposure", 0.0, at_least=0.0)
+        self.readout = self.values.number(top, "readout", 0.0, at_least=0.0)
         self._stages: dict[int, Stage] = {}
         self.shared: dict[Any, Any] = {}  # what stays the same from frame to frame: models, files
         if "view" in top and "path" in top:

@@ -43,6 +43,7 @@ class Stage:
         self.classes: dict[str, str] = {}
         self.motions: dict[str, Trajectory] = {}
         self.left_out = 0
+        self._scenes: dict[int, Scene] = {}
         entries = self._entries()
         for category in dict.fromkeys(category for _, _, category in entries):
             self.classes[f"category {category}"] = category  # numbers the classes alike in all frames
@@ -190,27 +191,37 @@ class Stage:
 
     def take(self, frame: int, step: int, length: int, rate: float) -> Take:
         """One frame."""
-        time, after = step / rate, (step + 1) / rate
-        cameras = self.animation.cameras_at(time)
-        scene = self._at(time, cameras)
-        following, later = None, None
-        if length > 1:
-            later = self.animation.cameras_at(after)
-            following = self._at(after, later)
-        rig, exposure = self.animation.rig, self.recipe.exposure
+        time, rig = step / rate, self.animation.rig
+        exposure, readout = self.recipe.exposure, self.recipe.readout
+        scene, cameras = self._moment(step, rate)
+        following, later = self._moment(step + 1, rate) if length > 1 else (None, None)
+        blurred, shutters = None, {}
+        if exposure or readout:
+            blurred, shutters = (scene, cameras) if readout else self.animation.blurred(time, exposure)
         seeds = Dice(self.recipe.seed, frame, "picture")
         return Take(
             frame=frame, scene=scene, cameras=cameras, following=following, later=later, classes=self.classes,
             sequence=self.sequence if length > 1 else 0, step=step if length > 1 else frame,
-            time=time if length > 1 else frame / rate, stereo=rig is not None and rig.rectified,
-            blurred=self.animation.blurred(time, exposure) if exposure else None,
-            targets=tuple(self.targets) if "place" in self.top else None,
+            time=time if length > 1 else frame / rate, stereo=rig is not None and rig.rectified and not readout,
+            blurred=blurred, shutters=shutters, targets=tuple(self.targets) if "place" in self.top else None,
             seeds=tuple(seeds.at(k).whole() for k in range(len(cameras))), note={"left_out": self.left_out},
         )  # fmt: skip
 
-    def _at(self, time: float, cameras: dict[str, Any]) -> Scene:
-        scene = self.animation.scene
-        return scene.replace(objects=self.animation.objects_at(time), camera=next(iter(cameras.values())))
+    def _moment(self, step: int, rate: float) -> tuple[Scene, dict[str, Any]]:
+        """What labels of a step belong to: an instant; under a rolling shutter all that moves while rows are read."""
+        if self.recipe.readout:
+            return self.animation.blurred(step / rate, self.recipe.exposure, self.recipe.readout)
+        return self._at(step, rate), self.animation.cameras_at(step / rate)
+
+    def _at(self, step: int, rate: float) -> Scene:
+        """The scene of a step; kept, for the next frame needs it too. Where nothing but the camera moves, there is one."""
+        step = step if self.motions else 0
+        if step not in self._scenes:
+            time = step / rate
+            camera = next(iter(self.animation.cameras_at(time).values()))
+            scene = self.animation.scene.replace(objects=self.animation.objects_at(time), camera=camera)
+            self._scenes = {**{k: v for k, v in self._scenes.items() if k == step - 1}, step: scene}
+        return self._scenes[step]
 
 
 def _ends(thing: Any) -> bool:

@@ -16,10 +16,11 @@ class Take:
     Parameters
     ----------
     frame, sequence, step, time : see `Shot`.
-    scene : what there is.
+    scene : what there is; its own camera is none of the take's.
     cameras : by name.
     following, later : the scene and the cameras of the next moment, for flow; None if there is none.
-    blurred : by camera, what the shutter sees: scenes in motion with cameras in motion; None for pictures of an instant.
+    blurred, shutters : what the shutter sees: the scene in motion, and the cameras in motion, by name; None for pictures of
+        an instant.
     stereo : whether there are two cameras, a rectified pair.
     classes : names of classes by names of objects, for `label`; they also number the classes.
     targets : indices in ``scene.objects`` of what the dataset is about; None for all that have an end.
@@ -35,7 +36,8 @@ class Take:
     time: float = 0.0
     following: Scene | None = None
     later: Mapping[str, Any] | None = None
-    blurred: Mapping[str, Scene] | None = None
+    blurred: Scene | None = None
+    shutters: Mapping[str, Any] = field(default_factory=dict)
     stereo: bool = False
     classes: Mapping[str, str] | None = None
     targets: tuple[int, ...] | None = None

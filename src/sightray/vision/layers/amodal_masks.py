@@ -9,6 +9,7 @@ import numpy as np
 from sightray.vision.layers.base import Layer
 from sightray.vision.masks import check_room, paint_masks
 from sightray.vision.pictures import Painting
+from sightray.vision.rolling import crossings
 
 
 class AmodalMasksLayer(Layer):
@@ -21,13 +22,11 @@ class AmodalMasksLayer(Layer):
     label, picture = "amodal_masks", "own"
 
     def needs(self, frame: Any) -> tuple[str, ...]:
-        frame.require_still()
         check_room(frame, self.label, 1)
         return ("ray_origin", "ray_direction")
 
     def compute(self, frame: Any) -> np.ndarray:
-        origins, directions = (frame.values[name].reshape(-1, 3) for name in ("ray_origin", "ray_direction"))
-        met = frame.view.scene.intersect_all(origins, directions, threads=frame.threads)
+        met = crossings(frame)
         masks = np.zeros((len(frame.objects), frame.height * frame.width), bool)
         row = np.full(len(frame.view.scene.objects), -1)
         row[[thing.index for thing in frame.objects]] = np.arange(len(frame.objects))

@@ -15,8 +15,8 @@ from sightray.vision.pictures import Painting, palette, title
 class Boxes3dLayer(Layer):
     """Corners in the world, (n, 8, 3), of the box around each object in its own frame; infinite for planes and the like.
 
-    Corner k takes x from the upper end if bit 0 of k is set, y by bit 1, z by bit 2. Tight for meshes and point clouds,
-    and for other shapes that are not in turned groups.
+    Corner k takes x from the upper end if bit 0 of k is set, y by bit 1, z by bit 2. Tight, also in
+    turned groups, but for quadrics and implicit surfaces, whose clipping boxes are enclosed there.
     """
 
     label, unit, frame, picture = "boxes_3d", "m", "world", "own"

@@ -49,7 +49,7 @@ class BrightnessConstancyLayer(Layer):
         here = pixel_centres(frame.width, frame.height).reshape(-1, 2)[seen]
         there = here + frame.values["flow"].reshape(-1, 2)[seen]
         before, after = shade(frame, here), shade(frame.beside("next"), there)
-        lost = np.append(frame.motion("next").item, -1)[before.item] != after.item  # at an outline, in rounding
+        lost = np.append(frame.partner_items("next"), -1)[before.item] != after.item  # at an outline, in rounding
         lights = frame.view.scene.lights, frame.other("next").scene.lights
         bits[seen] = np.where(lost, OCCLUDED, self.reasons(before, after, *lights))
         return bits.reshape(frame.height, frame.width).astype(np.int32)

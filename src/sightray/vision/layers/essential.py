@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from sightray.vision.epipolar import essential_matrix
+from sightray.vision.epipolar import essential_matrix, marked_pixels, paint_pencil
 from sightray.vision.layers.base import Layer
+from sightray.vision.pictures import Painting
 
 
 class EssentialLayer(Layer):
@@ -16,7 +17,16 @@ class EssentialLayer(Layer):
     Only what does not move between the two pictures obeys it.
     """
 
-    label = "essential"
+    label, picture = "essential", "own"
+
+    def needs(self, frame: Any) -> tuple[str, ...]:
+        return ("instance",)
 
     def compute(self, frame: Any) -> np.ndarray:
         return essential_matrix(frame.view, frame.other("next"))
+
+    def painting(self, labels: Any) -> Painting:
+        """Lines on which points of the next picture lie: the planes Eᵀ y1."""
+        other = labels.views["next"]
+        _, ways = other.camera.rays(marked_pixels(other))
+        return paint_pencil(labels, self, ways @ other.world_from_camera[:3, :3] @ labels[self.label])

@@ -32,13 +32,15 @@ class _Flow(Layer):
     point_layer: ClassVar[str] = "next_position"
 
     def pixelwise(self, frame: Any) -> bool:
-        return frame.motion(self.toward).linear
+        return not frame.rolls(self.toward) and frame.motion(self.toward).linear
 
     def needs(self, frame: Any) -> tuple[str, ...]:
-        return () if frame.motion(self.toward).linear else (self.point_layer,)
+        return () if self.pixelwise(frame) else (self.point_layer,)
 
     def compute(self, frame: Any) -> np.ndarray:
-        """For cameras whose projection is no matrix."""
+        """For cameras whose projection is no matrix, and where each row has its own time."""
+        if frame.rolls(self.toward):
+            return frame.rolling(self.toward).pixels - pixel_centres(frame.width, frame.height)
         there = frame.other(self.toward).project(frame.values[self.point_layer])
         return there - pixel_centres(frame.width, frame.height)
 

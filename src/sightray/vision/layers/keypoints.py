@@ -11,6 +11,7 @@ from sightray.vision.layers.base import Layer
 from sightray.vision.legend import Swatches
 from sightray.vision.masks import backdrop, draw_line
 from sightray.vision.pictures import Painting, palette, title
+from sightray.vision.rolling import clear_sight, object_points, seen_from
 
 OUTSIDE, HIDDEN, VISIBLE = 0, 1, 2  # COCO's values of visibility
 NEAR = 1e-6  # of the way to a keypoint: what is met closer to it is the surface that it lies on
@@ -21,13 +22,13 @@ class KeypointsLayer(Layer):
 
     The option `keypoints` of `label` names them, in each object's own frame. Visibility is as in COCO: 2 visible, 1 in
     the picture but hidden (by anything, the object itself included), 0 outside of it; x and y are NaN behind the
-    camera. It is found by a ray that must come within a millionth of its way to the point.
+    camera. It is found by a ray that must come within a millionth of its way to the point. Under a rolling shutter, points
+    of what moves are where the row that sees them finds them.
     """
 
     label, unit, frame, picture = "keypoints", "pixels", "pixel", "own"
 
     def needs(self, frame: Any) -> tuple[str, ...]:
-        frame.require_still()
         return ("instance",)
 
     def compute(self, frame: Any) -> dict[str, np.ndarray]:
@@ -43,15 +44,20 @@ class KeypointsLayer(Layer):
             inside = np.asarray(points, np.float64)
             if inside.ndim != 2 or inside.shape[1] != 3:
                 raise SceneError(f"label: keypoints: '{name}': got shape {inside.shape}; allowed: (n, 3)")
-            pose = known[name].world_from_object
-            found[name] = self._seen(frame, inside @ pose[:3, :3].T + pose[:3, 3])
+            found[name] = self._seen(frame, known[name], inside)
         return found
 
-    def _seen(self, frame: Any, points: np.ndarray) -> np.ndarray:
+    def _seen(self, frame: Any, thing: Any, inside: np.ndarray) -> np.ndarray:
         view = frame.view
-        pixels = view.project(points)
+        if view.blurred:
+            pixels, points = seen_from(view, lambda times: object_points(view, thing.index, inside, times), len(inside))
+            clear = clear_sight(frame, points, pixels)
+        else:
+            pose = thing.world_from_object
+            points = inside @ pose[:3, :3].T + pose[:3, 3]
+            pixels = view.project(points)
+            clear = view.sees(points, pixels, frame.threads, NEAR)
         visibility = np.where(view.within(pixels), HIDDEN, OUTSIDE)
-        clear = view.sees(points, pixels, frame.threads, NEAR)
         visibility[clear & (visibility == HIDDEN)] = VISIBLE
         return np.concatenate([pixels, visibility[:, None]], axis=1)
 

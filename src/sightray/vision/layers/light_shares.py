@@ -12,6 +12,7 @@ from sightray.mathlib.table import Table, i64_at, table_at, vec3_at
 from sightray.scene.world import lamp_count, light_at
 from sightray.vision.layers.base import Layer, fill
 from sightray.vision.lighting import Shares, seen_at, shares_of_light
+from sightray.vision.pictures import Painting, shares
 from sightray.vision.record import DIRECTION, PIXEL, WORLD, is_met, put_pair, record_at
 
 
@@ -24,10 +25,14 @@ class LightSharesLayer(Layer):
     """
 
     rays: int = integer("points along a side of each cell of a light", default=1, at_least=1, at_most=64)
-    label = "light_shares"
+    label, picture = "light_shares", "own"
 
     def columns_in(self, frame: Any) -> int:
         return 2 * len(frame.view.scene.lights)
+
+    def painting(self, labels: Any) -> Painting:
+        """Which share of each light lies before the surface, hidden or not."""
+        return shares(labels, self, labels[self.label][..., 1::2])
 
 
 (RAYS,) = LightSharesLayer.offsets()
@@ -42,8 +47,8 @@ def fill_light_shares(layer: Table, frame: Table, records: Table, count: i64, ou
         pixel = i64_at(record, PIXEL)
         met = is_met(record)
         for index in range(lights):
-            shares = Shares(math.nan, math.nan)
+            found = Shares(math.nan, math.nan)
             if met:
                 light, sight = light_at(world, index), vec3_at(record, DIRECTION)
-                shares = shares_of_light(frame, light, seen_at(frame, record), sight, i64_at(layer, RAYS))
-            put_pair(out, pixel * lights + index, shares.seen, shares.before)
+                found = shares_of_light(frame, light, seen_at(frame, record), sight, i64_at(layer, RAYS))
+            put_pair(out, pixel * lights + index, found.seen, found.before)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
+import numpy as np
+
 from sightray._jit import implements, kernel
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, i64_at, table_at, vec3_at
@@ -18,13 +20,22 @@ from sightray.vision.view import FAR, is_gone, moved_point
 class _OtherPosition(Layer):
     """What both have in common: the background's points are taken to be 1e15 m away, which is infinity in doubles."""
 
-    unit, frame, columns, letters = "m", "world", 3, "XYZ"
+    unit, frame, columns, picture, letters = "m", "world", 3, "box", "XYZ"
     detail = POINT
     toward: ClassVar[str] = "next"
 
+    def pixelwise(self, frame: Any) -> bool:
+        return not frame.rolls(self.toward)
+
     def needs(self, frame: Any) -> tuple[str, ...]:
+        if frame.rolls(self.toward):
+            return ("ray_origin", "ray_direction", "position", "item")
         frame.motion(self.toward)
         return ()
+
+    def compute(self, frame: Any) -> np.ndarray:
+        """Where each row has its own time: the point at that of the row that sees it there."""
+        return frame.rolling(self.toward).points
 
 
 class NextPositionLayer(_OtherPosition):

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 from sightray._jit import implements
 from sightray.mathlib.scalars import i64
@@ -21,6 +24,7 @@ from sightray.vision.record import (
     is_met,
     record_at,
 )
+from sightray.vision.rolling import inside_objects
 
 
 class ObjectCoordinatesLayer(Layer):
@@ -34,6 +38,24 @@ class ObjectCoordinatesLayer(Layer):
 
     label, frame, columns, picture, letters = "object_coordinates", "object", 3, "cube", "XYZ"
     detail, object_frames = POINT, True
+
+    def pixelwise(self, frame: Any) -> bool:
+        return not frame.view.blurred
+
+    def needs(self, frame: Any) -> tuple[str, ...]:
+        return ("position", "instance") if frame.view.blurred else ()
+
+    def compute(self, frame: Any) -> np.ndarray:
+        """Where each row has its own time: in the frame that the object has then."""
+        inside, instance = inside_objects(frame), frame.values["instance"]
+        boxes = {thing.index: thing for thing in frame.objects}
+        for index in np.unique(instance[instance >= 0]):
+            thing, own = boxes[index], instance == index
+            diagonal = np.linalg.norm(thing.upper - thing.lower)
+            with np.errstate(invalid="ignore"):
+                inside[own] = (inside[own] - 0.5 * (thing.lower + thing.upper)) / diagonal + 0.5
+            inside[own] = inside[own] if np.isfinite(diagonal) else np.nan
+        return inside
 
 
 @implements(fill, ObjectCoordinatesLayer)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 from sightray._jit import implements
 from sightray.mathlib.scalars import i64
@@ -21,6 +24,7 @@ from sightray.vision.record import (
     is_met,
     record_at,
 )
+from sightray.vision.rolling import inside_objects
 
 
 class ObjectPositionLayer(Layer):
@@ -28,6 +32,16 @@ class ObjectPositionLayer(Layer):
 
     label, unit, frame, columns, picture, letters = "object_position", "m", "object", 3, "box", "XYZ"
     detail, object_frames = POINT, True
+
+    def pixelwise(self, frame: Any) -> bool:
+        return not frame.view.blurred
+
+    def needs(self, frame: Any) -> tuple[str, ...]:
+        return ("position", "instance") if frame.view.blurred else ()
+
+    def compute(self, frame: Any) -> np.ndarray:
+        """Where each row has its own time: in the frame that the object has then."""
+        return inside_objects(frame)
 
 
 @implements(fill, ObjectPositionLayer)

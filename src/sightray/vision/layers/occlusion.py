@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sightray.vision.layers.base import Layer
+from sightray.vision.rolling import clear_sight
 
 
 class _Occlusion(Layer):
@@ -26,7 +27,10 @@ class _Occlusion(Layer):
         pixels = (frame.values[self.flow_layer] + np.stack([x, y], axis=-1) + 0.5).reshape(-1, 2)
         within = other.within(pixels)
         hidden = np.zeros(len(points), bool)
-        hidden[within] = ~other.sees(points[within], pixels[within], frame.threads)
+        if other.blurred:
+            hidden[within] = ~clear_sight(frame.beside(self.toward), points[within], pixels[within])
+        else:
+            hidden[within] = ~other.sees(points[within], pixels[within], frame.threads)
         return hidden.reshape(frame.height, frame.width)
 
 

@@ -13,7 +13,7 @@ from sightray.vision.record import ORIGIN, PIXEL, record_at
 class RayOriginLayer(Layer):
     """Where the ray of sight through the pixel's centre starts: the eye, for cameras that have one."""
 
-    label, unit, frame, columns, picture, letters = "ray_origin", "m", "world", 3, "", "XYZ"
+    label, unit, frame, columns, picture, letters = "ray_origin", "m", "world", 3, "box", "XYZ"
 
 
 @implements(fill, RayOriginLayer)

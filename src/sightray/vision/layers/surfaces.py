@@ -9,6 +9,7 @@ import numpy as np
 from sightray.vision.layers.base import Layer
 from sightray.vision.legend import Bar
 from sightray.vision.pictures import NOTHING, Painting, heat_colors, title
+from sightray.vision.rolling import crossings
 
 
 class Surfaces(NamedTuple):
@@ -40,12 +41,11 @@ class SurfacesLayer(Layer):
     label, unit, picture = "surfaces", "m", "own"
 
     def needs(self, frame: Any) -> tuple[str, ...]:
-        frame.require_still()
         return ("ray_origin", "ray_direction")
 
     def compute(self, frame: Any) -> Surfaces:
         origins, directions = (frame.values[name].reshape(-1, 3) for name in ("ray_origin", "ray_direction"))
-        found = frame.view.scene.intersect_all(origins, directions, threads=frame.threads)
+        found = crossings(frame)
         forward = frame.view.camera_from_world[2]
         start, slope = origins @ forward[:3] + forward[3], directions @ forward[:3]
         depth = start[found.ray] + found.t * slope[found.ray]

@@ -40,7 +40,11 @@ class Output:
         path.parent.mkdir(parents=True, exist_ok=True)
         with writing(path) as aside:
             yield aside
-            self._know(name, aside.read_bytes())
+            digest = hashlib.sha256()
+            with open(aside, "rb") as file:
+                while part := file.read(1 << 20):
+                    digest.update(part)
+            self.files[name] = {"sha256": digest.hexdigest(), "bytes": aside.stat().st_size}
 
     def binary(self, name: str, data: bytes) -> None:
         """Write a file."""
@@ -57,6 +61,16 @@ class Output:
     def json(self, name: str, value: Any) -> None:
         """Write a file of JSON."""
         self.text(name, json.dumps(value, indent=1) + "\n")
+
+    def json_parts(self, name: str, lists: dict[str, Iterable[Any]]) -> None:
+        """Write a JSON file of lists that are made as they are written, an entry to a line: none is in memory whole."""
+        with self.path(name) as aside, open(aside, "w", encoding="utf-8", newline="\n") as file:
+            for k, (key, entries) in enumerate(lists.items()):
+                file.write(f"{',' if k else '{'}\n{json.dumps(key)}: [")
+                for number, entry in enumerate(entries):
+                    file.write(f"{',' if number else ''}\n{json.dumps(entry)}")
+                file.write("\n]")
+            file.write("\n}\n")
 
     def _know(self, name: str, data: bytes) -> None:
         self.files[name] = {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -48,30 +49,40 @@ class CocoWriter(Writer):
             for name, thing in note["classes"].items():
                 kinds[name] = kinds.get(name, False) or thing
         number = {name: k for k, name in enumerate(sorted(kinds), 1)}
-        images = [{key: note[key] for key in ("id", "file_name", "width", "height")} for note in notes]
-        instances: list[dict[str, Any]] = []
-        panoptic = []
-        for note in notes:
-            segments = []
-            for one in note["segments"]:
-                shared = {
-                    "category_id": number[one["category"]],
-                    "area": one["area"],
-                    "bbox": one["bbox"],
-                    "iscrowd": 0,
-                }
-                segments.append({"id": one["id"], **shared})
-                if one["thing"]:
-                    size = [note["height"], note["width"]]
-                    segmentation = {"size": size, "counts": one["counts"]}
-                    instances.append({"id": len(instances) + 1, "image_id": note["id"], **shared,
-                                      "segmentation": segmentation})  # fmt: skip
-            panoptic.append({"image_id": note["id"], "file_name": note["file_name"], "segments_info": segments})
         things = [{"id": number[name], "name": name} for name in sorted(kinds) if kinds[name]]
         every = [{"id": number[name], "name": name, "isthing": int(kinds[name])} for name in sorted(kinds)]
-        instance_file = {"images": images, "annotations": instances, "categories": things}
-        out.json("annotations/instances.json", instance_file)
-        out.json("annotations/panoptic.json", {"images": images, "annotations": panoptic, "categories": every})
+        out.json_parts("annotations/instances.json", {
+            "images": _images(notes), "annotations": _instances(notes, number), "categories": things,
+        })  # fmt: skip
+        out.json_parts("annotations/panoptic.json", {
+            "images": _images(notes), "annotations": _panoptics(notes, number), "categories": every,
+        })  # fmt: skip
+
+
+def _images(notes: Iterable[Note]) -> Iterator[dict[str, Any]]:
+    return ({key: note[key] for key in ("id", "file_name", "width", "height")} for note in notes)
+
+
+def _instances(notes: Iterable[Note], number: dict[str, int]) -> Iterator[dict[str, Any]]:
+    """Annotations of the things in all pictures, numbered from 1."""
+    ids = itertools.count(1)
+    for note in notes:
+        for one in note["segments"]:
+            if one["thing"]:
+                mask = {"size": [note["height"], note["width"]], "counts": one["counts"]}
+                yield {"id": next(ids), "image_id": note["id"], **_shared(one, number), "segmentation": mask}
+
+
+def _panoptics(notes: Iterable[Note], number: dict[str, int]) -> Iterator[dict[str, Any]]:
+    """The segments of each picture."""
+    for note in notes:
+        segments = [{"id": one["id"], **_shared(one, number)} for one in note["segments"]]
+        yield {"image_id": note["id"], "file_name": note["file_name"], "segments_info": segments}
+
+
+def _shared(one: dict[str, Any], number: dict[str, int]) -> dict[str, Any]:
+    """What both files say of a segment."""
+    return {"category_id": number[one["category"]], "area": one["area"], "bbox": one["bbox"], "iscrowd": 0}
 
 
 def _segment(thing: Any, mask: np.ndarray, is_thing: bool) -> dict[str, Any]:

@@ -536,3 +536,105 @@ def test_holes_let_rays_through_however_many_items_there_are(others):
     there = (np.floor(o[:, 0] * 2) + np.floor(o[:, 1] * 2)) % 2 == 0
     np.testing.assert_array_equal(np.isfinite(scene.intersect(o, (0, 0, -1)).t), there)
     np.testing.assert_array_equal(scene.occluded(o, (0, 0, -1)), there)
+
+
+def netting(**options):
+    """Something with holes of every kind: by a texture, by chance, and one in the other."""
+    holes = sr.Checker(even=1.0, odd=0.2, scale=7.0)
+    return sr.Cutout(material=sr.Cutout(material=sr.Lambert(), opacity=0.8), opacity=holes, **options)
+
+
+@pytest.mark.parametrize("threshold", [None, 0.5])
+def test_layers_see_the_holes_that_the_nearest_hit_sees(threshold):
+    """All layers are the nearest hit, the nearest one behind it, and so on; `count` is their number."""
+    rng = np.random.default_rng(21)
+    v, f = blob(3)
+    uvs = rng.uniform(0, 1, (len(v), 2))
+    holey = mesh(v, f, uvs=uvs, material=netting(threshold=threshold))
+    turned = sr.Transform.translate(0.5, 0, 1) @ sr.Transform.rotate((1, 2, 0), 40) @ sr.Transform.scale(1, 0.5, 2)
+    scene = sr.Scene(holey, sr.Instance(of=holey, transform=turned), sr.Sphere(center=(0, 1, 0)),
+                     sr.Sphere(center=(1, 0, 0), radius=0.7, material=netting(threshold=threshold)))  # fmt: skip
+    o, d = random_rays(rng, 4000)
+    layers, whole = scene.intersect_all(o, d), scene.replace(objects=[bare(x) for x in scene.objects]).count(o, d)
+    number = np.diff(layers.offsets)
+    assert 0.3 < number.sum() / whole.sum() < 0.9
+    np.testing.assert_array_equal(scene.count(o, d), number)
+    np.testing.assert_array_equal(scene.count(o, d, 0.9, t_min=0.3), [((0.3 < t) & (t < 0.9)).sum() for t in split(layers)])
+    start, some, depth = np.zeros(400), slice(0, 400), 0
+    while True:
+        found = [scene.intersect(a, b, t_min=c) for a, b, c in zip(o[some], d[some], start, strict=True)]
+        hit = np.array([x.hit for x in found])
+        np.testing.assert_array_equal(hit, number[some] > depth)
+        if not hit.any():
+            break
+        rows = layers.offsets[:400][hit] + depth
+        start = np.array([x.t for x in found])  # of which the last digit may be another one in layers
+        np.testing.assert_allclose(layers.t[rows], start[hit], rtol=1e-12)
+        np.testing.assert_array_equal(layers.shape[rows], np.array([x.shape for x in found])[hit])
+        np.testing.assert_array_equal(layers.primitive[rows], np.array([x.primitive for x in found])[hit])
+        depth += 1
+    assert depth >= 4
+
+
+def bare(thing):
+    """The same without holes."""
+    inner = thing.replace(of=bare(thing.of)) if isinstance(thing, sr.Instance) else thing
+    return inner if isinstance(thing, sr.Instance) else thing.replace(material=sr.Lambert())
+
+
+def split(layers):
+    """The values of t of each ray."""
+    return np.split(layers.t, layers.offsets[1:-1])
+
+
+# ------------------------------------------------------------------------------------------------------ fast precision
+
+
+def test_fast_hits_are_those_of_single_precision(big):
+    """Coherent and incoherent rays, other shapes and moved meshes beside: the same hits but for rounding."""
+    rng = np.random.default_rng(22)
+    v, f = blob(5)
+    move = sr.Transform.translate(1.5, 0, 0) @ sr.Transform.scale(0.4, -0.6, 0.3)
+    mixed = sr.Scene(mesh(v, f), mesh(v, f, transform=move), sr.Sphere(center=(-1.5, 0, 0), radius=0.4))
+    side = (np.stack(np.meshgrid(np.arange(160), np.arange(160)), axis=-1).reshape(-1, 2) - 80) / 100
+    eye = np.concatenate([side, np.full((len(side), 1), 4.0)], axis=1)
+    o, d = random_rays(rng, 20_000)
+    for scene in (big, mixed):
+        for origins, directions in ((eye, (0.01, 0.02, -3)), (o, d), (o.astype(np.float32), d.astype(np.float32))):
+            exact = scene.intersect(origins, directions)
+            fast = scene.intersect(origins, directions, precision="fast")
+            both = exact.hit & fast.hit
+            assert both.mean() > 0.2
+            assert (exact.hit != fast.hit).mean() < 1e-3
+            assert (exact.primitive != fast.primitive).mean() < 5e-3
+            assert (exact.shape != fast.shape)[both].mean() < 1e-3
+            same = both & (exact.primitive == fast.primitive) & (exact.shape == fast.shape)
+            speed = np.broadcast_to(norm(np.asarray(directions)), len(origins))
+            away = np.abs(exact.t[same] - fast.t[same]) * speed[same]
+            assert 0 < np.max(away)
+            assert np.quantile(away, 0.99) < 2e-6
+            assert away.max() < 1e-4
+            np.testing.assert_allclose(fast.position[same], exact.position[same], atol=1e-6)
+            two = scene.intersect(origins, directions, precision="fast", threads=2)
+            np.testing.assert_array_equal(fast.t, two.t)
+    np.testing.assert_array_equal(big.occluded(o, d, precision="fast"), big.occluded(o, d))
+
+
+def test_fast_keeps_to_its_ends_and_to_what_is_no_ray(big):
+    o, d = np.array([0.1, 0.2, 5]), np.array([0, 0, -1.0])
+    t = float(big.intersect(o, d).t)
+    ends = np.array([t - 1e-4, t + 1e-4, np.nan, -1.0, INF])
+    assert big.intersect(o, d, ends, precision="fast").hit.tolist() == [False, True, False, False, True]
+    behind = big.intersect(o, d, t_min=t + 1e-4, precision="fast")
+    assert behind.t > t + 0.5
+    assert not big.intersect([(np.nan, 0, 0), (1e200, 0, 0)], d, precision="fast").hit.any()
+
+
+def test_fast_rays_seldom_slip_between_triangles():
+    """From the middle of a closed body to its edges and vertices: at most one in ten thousand is lost."""
+    rng = np.random.default_rng(23)
+    v, f = blob(4)
+    scene, n = sr.Scene(mesh(v, f)), 100_000
+    o = 0.05 * rng.normal(size=(n, 3))
+    d = edge_targets(rng, v, f, n) - o
+    assert scene.intersect(o, d, precision="fast").hit.mean() > 0.9999

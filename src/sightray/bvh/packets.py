@@ -27,6 +27,7 @@ from sightray.bvh.casting import (
     cast_packet,
     share,
 )
+from sightray.bvh.fast import end_fast, fast_in_turns, keep_nearer, tighten
 from sightray.bvh.hulls import (
     ALIVE,
     AXES,
@@ -82,6 +83,8 @@ from sightray.mathlib.table import Table, advance, f64_at, i64_at, i64_put, scra
 # and of a group.
 SPREAD, GROUP_SPREAD = 0.02, 0.08
 
+EXACT, FAST, ANY = 0, 1, 2  # what is asked
+
 # Words of the room: lanes, working memory and extremes of packets; then groups and, when these are done, bundles.
 PACKETS = 16
 LANES = 0
@@ -124,8 +127,8 @@ def pop_and_go_on(mesh: Table, group: Table, now: Turns, g: i64) -> Turns:
 
 
 @kernel
-def closest_together(mesh: Table, packets: Table, t_min: f64, groups: i64, room: Table) -> None:
-    """`closest_rays` for all groups, in turns."""
+def closest_together(mesh: Table, packets: Table, t_min: f64, groups: i64, fast: bool, room: Table) -> None:
+    """`closest_rays` or `fast_rays` for all groups, in turns."""
     nodes = table_at(mesh, NODES)
     now = Turns((1 << groups) - 1, 0)
     while now.nodes | now.leaves != 0:
@@ -148,7 +151,7 @@ def closest_together(mesh: Table, packets: Table, t_min: f64, groups: i64, room:
             g = lowest_bit(leaves)
             leaves &= leaves - 1
             group = group_at(room, g)
-            meet_block_closest(mesh, packets, t_min, i64_at(group, KEY) & (LEAF - 1), group, room)
+            meet_block_closest(mesh, packets, t_min, i64_at(group, KEY) & (LEAF - 1), fast, group, room)
             now = pop_and_go_on(mesh, group, now, g)
 
 
@@ -163,7 +166,9 @@ def sheared_axis(group: Table, packet: Table, work: Table, p: i64) -> i64:
 
 
 @kernel
-def meet_block_closest(mesh: Table, packets: Table, t_min: f64, block: i64, group: Table, room: Table) -> None:
+def meet_block_closest(
+    mesh: Table, packets: Table, t_min: f64, block: i64, fast: bool, group: Table, room: Table
+) -> None:
     """Meet the triangles of a block with the rays of a group."""
     blocks, first = table_at(mesh, BLOCKS), i64_at(group, FIRST)
     culled = cull_triangles(blocks, block * BLOCK_FLOATS, group)
@@ -172,12 +177,16 @@ def meet_block_closest(mesh: Table, packets: Table, t_min: f64, block: i64, grou
         culled &= culled - 1
         p, at = bit >> 2, block * BLOCK_FLOATS + (bit & 3)
         lanes = advance(room, LANES + (first + p) * LANE_WORDS)
-        maybe = filter_triangle(blocks, at, lanes).maybe & i64_at(group, ALIVE + p)
+        met = filter_triangle(blocks, at, lanes)
+        maybe = met.maybe & i64_at(group, ALIVE + p)
         if maybe != 0:
             packet, work = advance(packets, (first + p) * PACKET_WORDS), advance(room, WORKS + (first + p) * WORK_WORDS)
-            axis, found = sheared_axis(group, packet, work, p), i64_at(group, MET + p)
-            prim = int_at(table_at(mesh, NUMBERS), 4 * block + (bit & 3))
-            better = meet_packet(mesh, packet, work, lanes, axis, at + INDICES, prim, t_min, maybe, found)
+            found, prim = i64_at(group, MET + p), int_at(table_at(mesh, NUMBERS), 4 * block + (bit & 3))
+            if fast:
+                better = keep_nearer(packet, lanes, met.length, prim, maybe)
+            else:
+                axis = sheared_axis(group, packet, work, p)
+                better = meet_packet(mesh, packet, work, lanes, axis, at + INDICES, prim, t_min, maybe, found)
             if better != 0:
                 i64_put(group, MET + p, found | better)
                 put_reach(group, p, lanes)
@@ -260,8 +269,8 @@ def meet_block_any(mesh: Table, packets: Table, t_min: f64, block: i64, group: T
 
 
 @kernel
-def trace_rays(mesh: Table, packets: Table, count: i64, t_min: f64, any: bool, found: Table, room: Table) -> None:
-    """`closest_rays` or `any_rays`: packets that go the same way in groups, the others ray by ray."""
+def trace_rays(mesh: Table, packets: Table, count: i64, t_min: f64, what: i64, found: Table, room: Table) -> None:
+    """`closest_rays`, `fast_rays` or `any_rays`: packets that go the same way in groups, the others ray by ray."""
     groups, apart, alive = 0, scratch(16), scratch(16)
     for first in range(0, count, 4):
         coherent, axes, octants = 0, 0, 0
@@ -286,23 +295,27 @@ def trace_rays(mesh: Table, packets: Table, count: i64, t_min: f64, any: bool, f
             i64_put(group, FIRST, first)
             i64_put(group, AXES, axes)
             coherent &= ~gather_group(group, coherent, advance(alive, first), octants, room)
+    if what == FAST:
+        tighten(advance(room, LANES), count)
     if groups > 0:
-        if any:
+        if what == ANY:
             any_together(mesh, packets, t_min, groups, room)
         else:
-            closest_together(mesh, packets, t_min, groups, room)
+            closest_together(mesh, packets, t_min, groups, what == FAST, room)
         for g in range(groups):
             group = group_at(room, g)
             for p in range(4):
                 if i64_at(group, MET + p) != 0:
                     i64_put(found, i64_at(group, FIRST) + p, i64_at(group, MET + p))
     for first in range(0, count, 4):
-        trace_apart(mesh, packets, first, min(first + 4, count), t_min, any, apart, found, room)
+        trace_apart(mesh, packets, first, min(first + 4, count), t_min, what, apart, found, room)
+    if what == FAST:
+        end_fast(packets, advance(room, WORKS), advance(room, LANES), found, count)
 
 
 @kernel
 def trace_apart(
-    mesh: Table, packets: Table, first: i64, last: i64, t_min: f64, any: bool, apart: Table, found: Table, room: Table
+    mesh: Table, packets: Table, first: i64, last: i64, t_min: f64, what: i64, apart: Table, found: Table, room: Table
 ) -> None:
     """The rays `apart` of up to four packets, each on its own."""
     bits = 0
@@ -312,8 +325,10 @@ def trace_apart(
         return
     packet, works = advance(packets, first * PACKET_WORDS), advance(room, WORKS + first * WORK_WORDS)
     lanes, rest = advance(room, LANES + first * LANE_WORDS), advance(room, GROUPS)
-    if any:
+    if what == ANY:
         bits = any_in_turns(mesh, packet, t_min, bits, works, lanes, rest)
+    elif what == FAST:
+        bits = fast_in_turns(mesh, packet, t_min, bits, works, lanes, rest)
     else:
         bits = closest_in_turns(mesh, packet, t_min, bits, works, lanes, rest)
     for number in range(first, last):
@@ -359,10 +374,16 @@ def closest_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Tab
     Their bits are written to `found`, a word for each packet. Their hits are what `closest_triangle` finds; of equal t the
     triangle that comes first.
     """
-    trace_rays(mesh, packets, count, t_min, False, found, room)
+    trace_rays(mesh, packets, count, t_min, EXACT, found, room)
+
+
+@kernel
+def fast_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
+    """`closest_rays`, decided in single precision (see `fast`)."""
+    trace_rays(mesh, packets, count, t_min, FAST, found, room)
 
 
 @kernel
 def any_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
     """The rays of up to sixteen packets that meet the mesh between t_min and their end: bits as for `closest_rays`."""
-    trace_rays(mesh, packets, count, t_min, True, found, room)
+    trace_rays(mesh, packets, count, t_min, ANY, found, room)

@@ -46,6 +46,7 @@ class FilteredLanes(NamedTuple):
 
     maybe: i64  # those that may meet the triangle
     surely: i64  # those that meet it, whatever the rounding
+    length: F32x16  # where, in single precision
 
 
 @kernel
@@ -67,12 +68,12 @@ def filter_triangle(blocks: Table, at: i64, lanes: Table) -> FilteredLanes:
     side, zero = size * load16(lanes, SIDE), splat16(0.0)
     inside = vmin16(vmin16(u, v), det - (u + v))
     if movemask16(inside + side >= zero) == 0:
-        return FilteredLanes(0, 0)
+        return FilteredLanes(0, 0, zero)
     along = size * size * load16(lanes, ALONG)
     t = flip16(cx * qx + cy * qy + cz * qz, signed)
     ahead = vmin16(t, det * load16(lanes, END_AT) - t)
     maybe = (inside + side >= zero) & (ahead + along >= zero)
-    return FilteredLanes(movemask16(maybe), movemask16((inside > side) & (ahead > along)))
+    return FilteredLanes(movemask16(maybe), movemask16((inside > side) & (ahead > along)), t / det)
 
 
 @kernel(exact=True)

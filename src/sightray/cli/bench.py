@@ -20,13 +20,31 @@ def measurements() -> None:
 
 @bench.command()
 def rays(
-    peers: Annotated[bool, typer.Option(help="Also those of Open3D, Mitsuba, embreex, trimesh that are installed.")] = False,
+    case: Annotated[
+        str, typer.Option(help="balls, thin, million, instances, spheres, stadium, adversarial; a mesh file; or all.")
+    ] = "balls",
+    peers: Annotated[bool, typer.Option(help="Also Open3D, Mitsuba, embreex, trimesh, if installed.")] = False,
+    threads: Annotated[int | None, typer.Option(min=1, help="At most so many; by default one for every core.")] = None,
+    rounds: Annotated[int, typer.Option(min=1, help="Of which medians are taken.")] = 7,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Rays each second on half a million triangles, coherent and diffuse, nearest and any hit."""
+    """Rays each second, coherent and diffuse, nearest and any hit; by default on half a million triangles."""
     from sightray.cli import bench_rays
 
-    bench_rays.rays(peers, as_json)
+    bench_rays.rays(peers, as_json, case, threads, rounds)
+
+
+@bench.command()
+def scaling(
+    largest: Annotated[int, typer.Option(min=1000, help="Triangles of the largest mesh.")] = 4_000_000,
+    plot: Annotated[Path | None, typer.Option(help="Draw the tables as an SVG file.")] = None,
+    rounds: Annotated[int, typer.Option(min=1, help="Of which medians are taken.")] = 5,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """What a ray costs, by threads, triangles and image size."""
+    from sightray.cli import bench_scaling
+
+    bench_scaling.scaling(as_json, plot, largest, rounds)
 
 
 @bench.command()

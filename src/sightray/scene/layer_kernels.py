@@ -1,21 +1,24 @@
 """Layers: all crossings of rays with all items of a scene, in order along each ray.
 
-Shapes that are no meshes are asked for one hit after the other.
+Shapes that are no meshes are asked for one hit after the other. Crossings of surfaces where these have a hole are sieved
+out afterwards, in scenes that have any.
 """
 
 from __future__ import annotations
 
 from sightray._jit import kernel
 from sightray.accelerators.bvh import ITEMS, ORDER, UNBOUNDED, UNBOUNDED_COUNT
-from sightray.accelerators.item import SHAPE, item_at
+from sightray.accelerators.item import CUTOUT, FLAGS, SHAPE, ItemHit, item_at
 from sightray.bvh.bvh8 import LEAF, NODES, STACK_WORDS, box_ray, int_at, push_children_unsorted, unit_ray
 from sightray.mathlib.hit import is_hit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.sorting import sort_rows, swap_rows
-from sightray.mathlib.table import Table, f64_at, i64_at, i64_put, scratch, table_at
+from sightray.mathlib.table import Table, advance, f64_at, i64_at, i64_put, scratch, table_at
 from sightray.mathlib.vec import Vec3, dot, max3, vabs
 from sightray.scene.crossings import LAYER_WORDS, MESH, cross_mesh, object_ray, put_layer
-from sightray.scene.query_kernels import LOOK, end_at, triple_at
+from sightray.scene.query_kernels import LOOK, end_at, exact_hit, triple_at
+from sightray.scene.world import ITEMS as WORLD_ITEMS
+from sightray.scene.world import through_hole
 from sightray.shapes.base import intersect, surface
 
 ENOUGH = 1 << 20  # crossings of one shape; stops a shape that would answer for ever
@@ -123,6 +126,37 @@ def layers_of_rays(
         i64_put(counts, i, after - row)
         row = after
     return n
+
+
+@kernel
+def is_hole(world: Table, kinds: Table, row: Table, o: Vec3, d: Vec3) -> bool:
+    """Whether a crossing is where the surface has a hole for this ray, as `find_closest` sees it."""
+    index = i64_at(row, 1)
+    if i64_at(item_at(table_at(world, WORLD_ITEMS), index), FLAGS) & CUTOUT == 0:
+        return False
+    hit = ItemHit(f64_at(row, 0), index, i64_at(row, 2), 0.0, 0.0)
+    return through_hole(world, exact_hit(world, kinds, hit, o, d), o, d)
+
+
+@kernel
+def sieve_layers(
+    world: Table, kinds: Table, origins: Table, o_form: i64, directions: Table, d_form: i64, first: i64, last: i64,
+    rows: Table, counts: Table, stop: Table,
+) -> None:  # fmt: skip
+    """Leave out the crossings of rays number `first` to ``last - 1`` that are holes; the others move up."""
+    row, kept = 0, 0
+    for i in range(first, last):
+        if i & LOOK == LOOK and i64_at(stop, 0) != 0:
+            return
+        o, d, before = triple_at(origins, o_form, i), triple_at(directions, d_form, i), kept
+        for _ in range(i64_at(counts, i)):
+            crossing = advance(rows, row * LAYER_WORDS)
+            if not is_hole(world, kinds, crossing, o, d):
+                for word in range(LAYER_WORDS):
+                    i64_put(rows, kept * LAYER_WORDS + word, i64_at(crossing, word))
+                kept += 1
+            row += 1
+        i64_put(counts, i, kept - before)
 
 
 @kernel

@@ -17,7 +17,7 @@ import math
 from typing import NamedTuple
 
 from sightray._jit import kernel
-from sightray.accelerators.bvh import ITEMS, ORDER
+from sightray.accelerators.bvh import ITEMS, ORDER, UNBOUNDED, UNBOUNDED_COUNT
 from sightray.accelerators.item import OBJECT, SHAPE, item_at, to_object
 from sightray.bvh.bvh8 import CHILD, LEAF, NODES, SCALE, STACK_WORDS, int_at
 from sightray.bvh.nearest import push_nearest, to_unit
@@ -114,9 +114,19 @@ def nearest_of_mesh(item: Table, index: i64, shrink: f64, p: Vec3, best: Near) -
 
 
 @kernel
+def nearest_of_item(tree: Table, kinds: Table, shrinks: Table, index: i64, p: Vec3, best: Near) -> Near:
+    """`nearest_of_mesh` for an item, if that shows a mesh."""
+    if int_at(kinds, index) != MESH:
+        return best
+    return nearest_of_mesh(item_at(table_at(tree, ITEMS), index), index, f64_at(shrinks, index), p, best)
+
+
+@kernel
 def nearest_of_items(tree: Table, kinds: Table, shrinks: Table, p: Vec3) -> Near:
     """The nearest point of all meshes of a scene."""
     best = Near(math.inf, -1, -1, 0.0, 0.0)
+    for i in range(i64_at(tree, UNBOUNDED_COUNT)):  # all of them, where they are few
+        best = nearest_of_item(tree, kinds, shrinks, int_at(table_at(tree, UNBOUNDED), i), p, best)
     unit = to_unit(tree, p)
     per_world = f64_at(tree, SCALE) * (1.0 + 2.0**-40)
     per_world *= per_world
@@ -134,10 +144,7 @@ def nearest_of_items(tree: Table, kinds: Table, shrinks: Table, p: Vec3) -> Near
             continue
         first = (child - LEAF) >> 3
         for i in range(first, first + (child & 7)):
-            index = int_at(table_at(tree, ORDER), i)
-            if int_at(kinds, index) == MESH:
-                item = item_at(table_at(tree, ITEMS), index)
-                best = nearest_of_mesh(item, index, f64_at(shrinks, index), p, best)
+            best = nearest_of_item(tree, kinds, shrinks, int_at(table_at(tree, ORDER), i), p, best)
     return best
 
 

@@ -21,7 +21,7 @@ from sightray.accelerators.item import (
 from sightray.bvh.bundles import packet_vec3
 from sightray.bvh.bvh8 import int_at
 from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
-from sightray.bvh.packets import PACKETS, ROOM_WORDS, any_rays, closest_rays
+from sightray.bvh.packets import EXACT, FAST, PACKETS, ROOM_WORDS, any_rays, closest_rays, fast_rays
 from sightray.mathlib.lanes import (
     load16d,
     mask16,
@@ -111,15 +111,27 @@ def move_packets(item: Table, packets: Table, count: i64, moved: Table) -> None:
 
 
 @kernel
-def closest_of_packets(
-    item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64, found: Table, room: Table
+def closest_of_mesh(
+    mesh: Table, precision: i64, packets: Table, count: i64, t_min: f64, found: Table, room: Table
 ) -> None:
+    """`closest_rays`, or `fast_rays` if these will do."""
+    if precision == FAST:
+        fast_rays(mesh, packets, count, t_min, found, room)
+    else:
+        closest_rays(mesh, packets, count, t_min, found, room)
+
+
+@kernel
+def closest_of_packets(
+    item: Table, is_mesh: bool, precision: i64, packets: Table, count: i64, moved: Table, t_min: f64, found: Table,
+    room: Table,
+) -> None:  # fmt: skip
     """The rays of packets that meet an item before their end, which is brought there."""
     if is_mesh and i64_at(item, MOVED) == 0:
-        closest_rays(table_at(item, SHAPE), packets, count, t_min, found, room)
+        closest_of_mesh(table_at(item, SHAPE), precision, packets, count, t_min, found, room)
     elif is_mesh:
         move_packets(item, packets, count, moved)
-        closest_rays(table_at(item, SHAPE), moved, count, t_min, found, room)
+        closest_of_mesh(table_at(item, SHAPE), precision, moved, count, t_min, found, room)
         for p in range(count):
             packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
             better = mask16(i64_at(found, p))
@@ -144,7 +156,7 @@ def closest_of_packets(
 def closest_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
     """`closest_of_packets` for up to four packets, with working memory of its own; the bits of the rays."""
     found, room, bits = scratch(16), scratch(ROOM_WORDS), 0
-    closest_of_packets(item, is_mesh, packets, count, moved, t_min, found, room)
+    closest_of_packets(item, is_mesh, EXACT, packets, count, moved, t_min, found, room)
     for p in range(count):
         bits |= i64_at(found, p) << (16 * p)
     return bits
@@ -152,8 +164,9 @@ def closest_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, move
 
 @kernel
 def closest_of_few(
-    world: Table, kinds: Table, n_items: i64, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table,
-    e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table, room: Table,
+    world: Table, kinds: Table, n_items: i64, precision: i64, origins: Table, o_form: i64, directions: Table, d_form: i64,
+    ends: Table, e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table,
+    room: Table,
 ) -> None:  # fmt: skip
     """The nearest hit of each ray: float64 t, and int32 item, object and primitive, -1 where there is none."""
     packets, moved, item, thing = scratch(2048), scratch(2048), scratch(256), scratch(256)
@@ -173,7 +186,7 @@ def closest_of_few(
             i64_put(found, p, 0)
         for index in range(n_items):
             row = item_at(rows, index)
-            closest_of_packets(row, int_at(kinds, index) == MESH, packets, count, moved, t_min, met, room)
+            closest_of_packets(row, int_at(kinds, index) == MESH, precision, packets, count, moved, t_min, met, room)
             for p in range(count):
                 i64_put(found, p, i64_at(found, p) | i64_at(met, p))
                 these = mask16(i64_at(met, p))

@@ -13,14 +13,14 @@ import numpy as np
 from sightray._jit import native
 from sightray.accelerators.bvh import pack_items
 from sightray.accelerators.item import CUTOUT
-from sightray.bvh.packets import ROOM_WORDS
+from sightray.bvh.packets import EXACT, FAST, ROOM_WORDS
 from sightray.errors import SceneError
 from sightray.mathlib.table import Table, aligned, table_at
 from sightray.scene.columns import Column, Output, common_shape, numbers
 from sightray.scene.compile import Compiled, compile_scene, world_bounds
 from sightray.scene.crossings import LAYER_WORDS, MESH, OTHER
 from sightray.scene.hits import Details, Hits, Layers
-from sightray.scene.layer_kernels import count_of_rays, layers_of_rays
+from sightray.scene.layer_kernels import count_of_rays, layers_of_rays, sieve_layers
 from sightray.scene.packet_kernels import FEW_ITEMS, any_of_few, closest_of_few
 from sightray.scene.parallel import run_chunks
 from sightray.scene.query_kernels import any_of_rays, closest_of_rays, describe_hits
@@ -40,8 +40,8 @@ class Asked:
         kinds = np.array([MESH if isinstance(item.shape, Mesh) else OTHER for item in items] or [OTHER], np.int32)
         self.kinds = self.compiled.tables.space.array(kinds)
         self.objects = np.array([item.object for item in items], np.int32)
-        holes = self.world.view(np.int64)[FLAGS] & CUTOUT  # packets do not know that surfaces may have them
-        self.packets = 0 < len(items) <= FEW_ITEMS and MESH in kinds and not holes
+        self.holes = bool(self.world.view(np.int64)[FLAGS] & CUTOUT)  # packets do not know that surfaces may have them
+        self.packets = 0 < len(items) <= FEW_ITEMS and MESH in kinds and not self.holes
         self._tree: Table | None = None
         self._kernels: dict[Callable, Callable] = {}
 
@@ -53,10 +53,10 @@ class Asked:
             found = self._kernels[function] = native(function)
         return found
 
-    def closest(self) -> Callable:
+    def closest(self, precision: str) -> Callable:
         """The kernel for the nearest hit, with its scene: by packets where a mesh is among few items."""
         if self.packets:
-            return self.with_room(closest_of_few)
+            return self.with_room(closest_of_few, FAST if precision == "fast" else EXACT)
         return partial(self.kernel(closest_of_rays), self.world)
 
     def any(self) -> Callable:
@@ -65,9 +65,9 @@ class Asked:
             return self.with_room(any_of_few)
         return partial(self.kernel(any_of_rays), self.world)
 
-    def with_room(self, function: Callable) -> Callable:
-        """A kernel of packets, with its scene, and with working memory for each thread."""
-        run = partial(self.kernel(function), self.world, self.kinds, len(self.objects))
+    def with_room(self, function: Callable, *options: int) -> Callable:
+        """A kernel of packets, with its scene and options, and with working memory for each thread."""
+        run = partial(self.kernel(function), self.world, self.kinds, len(self.objects), *options)
         return lambda *arguments: run(*arguments, room())
 
     def tree(self) -> Table:
@@ -133,7 +133,7 @@ def thread_option(verb: str, threads: Any) -> int | None:
 
 def intersect(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, precision: str, threads: Any) -> Hits:
     rays, ready = Rays("intersect", origins, directions, t_max, t_min, precision, threads), asked(scene)
-    n, run = rays.n, ready.closest()
+    n, run = rays.n, ready.closest(precision)
     block = np.empty((5, n), np.int32)  # one piece of memory is allocated, and found by kernels, faster than four
     t, item, shape, primitive = block[:2].reshape(-1).view(np.float64), block[2], block[3], block[4]
     start = Output(t)
@@ -183,8 +183,11 @@ def occluded(
 
 def count(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, threads: Any) -> np.ndarray:
     rays, ready = Rays("count", origins, directions, t_max, t_min, "exact", threads), asked(scene)
-    tree = ready.tree()
-    run, counts = ready.kernel(count_of_rays), np.zeros(rays.n, np.int64)
+    counts = np.zeros(rays.n, np.int64)
+    if ready.holes:
+        _layers(ready, rays, counts, lambda first, rows: None)
+        return counts.reshape(rays.shape)
+    tree, run = ready.tree(), ready.kernel(count_of_rays)
 
     def work(first: int, last: int, stop: Table) -> None:
         arguments = rays.arguments(first, last)
@@ -194,27 +197,34 @@ def count(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, thr
     return counts.reshape(rays.shape)
 
 
-def intersect_all(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, threads: Any) -> Layers:
-    rays, ready = Rays("intersect_all", origins, directions, t_max, t_min, "exact", threads), asked(scene)
-    tree = ready.tree()
-    run, counts = ready.kernel(layers_of_rays), np.zeros(rays.n, np.int64)
-    parts: dict[tuple[int, int], np.ndarray] = {}
+def _layers(ready: Asked, rays: Rays, counts: np.ndarray, keep: Callable[[int, np.ndarray], None]) -> None:
+    """Fill `counts`, and give the crossings of rays from a number on to `keep`, a few thousand rays at a time."""
+    tree, run = ready.tree(), ready.kernel(layers_of_rays)
+    sieve = ready.kernel(sieve_layers) if ready.holes else None
 
     def work(first: int, last: int, stop: Table) -> None:
         columns, n, ray = rays.arguments(first, last), last - first, 0
+        number = Table(counts[first:last])
         capacity = 4 * n + 64
         while ray < n:
             rows = aligned((capacity, LAYER_WORDS), np.int64)
-            done = run(tree, ready.kinds, *columns, rays.t_min, n, ray, Table(rows), capacity,
-                       Table(counts[first:last]), stop)  # fmt: skip
+            done = run(tree, ready.kinds, *columns, rays.t_min, n, ray, Table(rows), capacity, number, stop)
             if done == ray:
                 capacity *= 4
                 continue
-            parts[first, ray] = rows[: counts[first + ray : first + done].sum()].copy()
+            if sieve is not None:
+                sieve(ready.world, ready.kinds, *columns[:4], ray, done, Table(rows), number, stop)
+            keep(first + ray, rows[: counts[first + ray : first + done].sum()])
             ray = done
 
     run_chunks(rays.n, work, rays.threads)
-    rows = np.concatenate([parts.pop(key) for key in sorted(parts)] or [np.empty((0, LAYER_WORDS), np.int64)])
+
+
+def intersect_all(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, threads: Any) -> Layers:
+    rays, ready = Rays("intersect_all", origins, directions, t_max, t_min, "exact", threads), asked(scene)
+    counts, parts = np.zeros(rays.n, np.int64), {0: np.empty((0, LAYER_WORDS), np.int64)}
+    _layers(ready, rays, counts, lambda first, rows: parts.update({first: rows.copy()}))
+    rows = np.concatenate([parts.pop(key) for key in sorted(parts)])
     item = rows[:, 1].astype(np.int32)
     return Layers(
         np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]), np.repeat(np.arange(rays.n), counts),

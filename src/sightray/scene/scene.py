@@ -90,7 +90,10 @@ class Scene(Member, family="scene"):
             Where rays end. Hits have t_min < t < t_max.
         t_min : where rays begin.
         precision : "exact" or "fast"
-            Hits are decided in double precision either way; "fast" gives leave not to, and is at present the same.
+            "exact": hits are decided in double precision, whatever the scale. "fast" gives leave to decide them in single
+            precision, as other ray tracers do: a sixth to a quarter faster where a mesh is among at most four items, the
+            same elsewhere. Then t is off by up to about 1e-5 of the mesh's size, and so are t_min and t_max; three rays in
+            ten thousand, at edges, name the triangle next to theirs, and rays may slip between two triangles.
         threads : at most so many; by default one for every core.
 
         Returns

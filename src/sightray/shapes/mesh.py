@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sightray._jit import METHOD_SLOTS, implements, kernel
+from sightray.bvh.refit import expected_cost, refit_mesh
 from sightray.bvh.triangles import (
     MESH_WORDS,
     MeshTree,
@@ -22,8 +23,9 @@ from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i32_at, is_null, table_at
 from sightray.mathlib.vec import Vec3, cross, dot, grey
-from sightray.shapes.base import Shape, Surface, intersect, occluded, rise, surface
+from sightray.shapes.base import Shape, Surface, handedness, intersect, occluded, rise, surface
 
+WORN = 0.5  # quality of a refitted tree below which another one should be built
 _SLIVER = 1e-15  # twice the area over the longest edge squared, up to which three corners count as on one line
 
 
@@ -98,6 +100,60 @@ class Mesh(Shape):
             object.__setattr__(self, "_tree", build_mesh(*self._used()))
         return vars(self)["_tree"]
 
+    def with_vertices(self, vertices: Any, normals: Any = None) -> Mesh:
+        """The same triangles over vertices that have moved, for meshes that bend from frame to frame.
+
+        The tree is refitted (`bvh.refit`), which is several times as fast as building it; hits are those of
+        ``mesh.replace(vertices=...)``. Where vertices wander far from their neighbours rays become slower: `tree_quality`
+        tells how much. No triangle is dropped: those that have lost their area keep their number and are not met.
+
+        Parameters
+        ----------
+        vertices : (n, 3) floats, m
+            As many as the mesh has.
+        normals : (n, 3) floats
+            At the moved vertices; needed if the mesh has any.
+
+        Raises
+        ------
+        SceneError
+            If the arrays have another shape, hold numbers that are not finite, or normals are missing.
+
+        Warns
+        -----
+        UserWarning
+            If `tree_quality` has fallen below 0.5.
+        """
+        if (normals is None) != (self.normals is None):
+            got = "missing, and the mesh has some" if normals is None else "given, and the mesh has none"
+            raise SceneError(f"Mesh.with_vertices: normals: {got}; .replace(vertices=..., normals=...) can change that")
+        moved = {"vertices": vertices} | ({} if normals is None else {"normals": normals})
+        for name, value in moved.items():
+            try:
+                moved[name] = self.given[name].convert(value)
+            except SceneError as error:
+                raise SceneError(f"Mesh.with_vertices: {name}: {error}") from None
+            if len(moved[name]) != len(self.vertices):
+                told = f"got {len(moved[name])} rows; allowed: one for each of the {len(self.vertices)} vertices"
+                raise SceneError(f"Mesh.with_vertices: {name}: {told}")
+        mesh = object.__new__(type(self))
+        for name, value in {**self.values(), **moved, "dropped": self.dropped}.items():
+            object.__setattr__(mesh, name, value)
+        tree = self.tree()
+        object.__setattr__(mesh, "_tree", refit_mesh(tree, mesh._used()[0]))
+        object.__setattr__(mesh, "_built_cost", vars(self).get("_built_cost", expected_cost(tree)))
+        if mesh.tree_quality < WORN:
+            warnings.warn(
+                f"Mesh.with_vertices: the tree that was refitted has {mesh.tree_quality:.2g} of its quality: rays will be "
+                "slow; .replace(vertices=...) builds another", stacklevel=2)  # fmt: skip
+        return mesh
+
+    @property
+    def tree_quality(self) -> float:
+        """About how fast rays go through a refitted tree, over how fast when it was built; 1 if it was not refitted."""
+        built = vars(self).get("_built_cost")
+        return 1.0 if built is None else built / expected_cost(self.tree())
+
     def _used(self) -> tuple[np.ndarray, np.ndarray]:
         """Vertices and faces without vertices that no face names: a stray one would spoil the scale of the tree."""
         used = np.zeros(len(self.vertices), bool)
@@ -122,6 +178,19 @@ implements(occluded, Mesh)(any_triangle)
 def vec3_of(rows: Table, row: i64) -> Vec3:
     """Row of an (n, 3) array."""
     return Vec3(f64_at(rows, 3 * row), f64_at(rows, 3 * row + 1), f64_at(rows, 3 * row + 2))
+
+
+@implements(handedness, Mesh)
+def handedness_of_face(mesh: Table, prim: i64) -> f64:
+    """Twice the signed area of the face in its texture coordinates."""
+    uvs, faces, first = table_at(mesh, UVS), table_at(mesh, FACES_GIVEN), 3 * prim
+    if is_null(uvs):
+        return 1.0
+    i, j, k = int(i32_at(faces, first)), int(i32_at(faces, first + 1)), int(i32_at(faces, first + 2))
+    u0, v0 = f64_at(uvs, 2 * i), f64_at(uvs, 2 * i + 1)
+    du1, dv1 = f64_at(uvs, 2 * j) - u0, f64_at(uvs, 2 * j + 1) - v0
+    du2, dv2 = f64_at(uvs, 2 * k) - u0, f64_at(uvs, 2 * k + 1) - v0
+    return du1 * dv2 - du2 * dv1
 
 
 @implements(surface, Mesh)

@@ -179,6 +179,9 @@ def directional_albedo(material, angle, count=22_500):
     pytest.param(lambda r: sr.Principled(base_color=1, transmission=1, roughness=r, ior=1.8), id="clear"),
     pytest.param(lambda r: sr.Principled(base_color=1, transmission=1, roughness=r, thin_walled=True), id="sheet"),
     pytest.param(lambda r: sr.Principled(base_color=1, transmission=0.4, metallic=0.3, roughness=r), id="all"),
+    pytest.param(lambda r: sr.Principled(base_color=1, metallic=1, roughness=r, anisotropy=0.7), id="brushed-base"),
+    pytest.param(lambda r: sr.Principled(base_color=1, transmission=1, roughness=r, anisotropy=-0.7), id="brushed-clear"),
+    pytest.param(lambda r: sr.Principled(base_color=1, roughness=r, ior=2, anisotropy=1), id="brushed-plastic"),
     pytest.param(lambda r: sr.OrenNayar(albedo=1, sigma=90 * r), id="matte"),
 ])  # fmt: skip
 def test_white_furnace(make, roughness):
@@ -209,9 +212,14 @@ def test_the_back_of_two_sided_answers_as_the_front():
     np.testing.assert_allclose(front[:, [0, 1, 4, 8, 12, 13, 14]], back[:, [0, 1, 4, 8, 12, 13, 14]], rtol=1e-12)
 
 
-def test_a_brushed_metal_has_highlights_along_u():
+@pytest.mark.parametrize("metal", [
+    sr.Conductor(metal="Al", roughness=0.4, anisotropy=0.8),
+    sr.Principled(metallic=1, roughness=0.4, anisotropy=0.8),
+], ids=["Conductor", "Principled"])  # fmt: skip
+def test_a_brushed_metal_has_highlights_along_u(metal):
     """Anisotropy above 0: facets vary more along the tangent than across it."""
-    wi = asked(sr.Conductor(metal="Al", roughness=0.4, anisotropy=0.8), VIEWERS["top"], 4000)[:, :2]
+    assert metal.oriented
+    wi = asked(metal, VIEWERS["top"], 4000)[:, :2]
     wide, narrow = np.quantile(np.abs(wi), 0.5, axis=0)
     assert wide > 2.5 * narrow
 

@@ -141,9 +141,10 @@ def test_a_cylinder_shows_planar_views_by_szeliskis_formulas():
 
 def test_a_view_cut_from_a_panorama_is_a_perspective_picture():
     """From the same eye, pixel for pixel, as far as the panorama's own pixels allow."""
+    checks = sr.Bitmap(image=np.array([[0.2, 0.8], [0.8, 0.2]]), filter="nearest", scale=2)  # as hard for both cameras
     scene = sr.Scene(
         sr.Rectangle(corner=(-3, -1, -1), edge_u=(6, 0, 0), edge_v=(0, 0, -5),
-                     material=sr.Phong(diffuse=0, specular=0, ambient=sr.Checker(scale=4))),
+                     material=sr.Phong(diffuse=0, specular=0, ambient=checks)),
         sr.Sphere(center=(1, 0, -4), material=sr.Phong(diffuse=0, specular=0, ambient=(0.9, 0.2, 0.1))),
         ambient=1.0, background=(0.2, 0.4, 0.9),
     )  # fmt: skip

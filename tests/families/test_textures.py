@@ -373,3 +373,28 @@ def test_a_broken_file_is_a_format_error_that_names_it(tmp_path):
 def test_errors_say_where_what_and_what_is_allowed(make, message):
     with pytest.raises(SceneError, match=message):
         make()
+
+
+# --- brightness ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("texture", [
+    pytest.param(t, id=f"{name}{k}") for name, examples in EXAMPLES.items() for k, t in enumerate(examples)
+])  # fmt: skip
+def test_brightness_is_about_the_mean(texture):
+    """Right to the last digit where a pattern has equal shares; else a lamp's guess."""
+    places = np.zeros((40_000, 9))
+    places[:, :5] = np.random.default_rng(2).uniform(-30, 30, (40_000, 5))
+    places[:, 5] = places[:, 6] = places[:, 7] = math.sqrt(1 / 3)
+    mean = colours_of(texture, places).mean()
+    assert texture.brightness() == pytest.approx(mean, rel=0.02 if isinstance(texture, Checker | Constant) else 0.75)
+
+
+def test_brightness_of_what_is_made_of_others():
+    half = Checker(even=1, odd=0)
+    assert half.brightness() == 0.5
+    assert Multiply(a=half, b=(3, 0, 0)).brightness() == 0.5
+    assert Bitmap(image=COLOURS).brightness() == pytest.approx(COLOURS.mean())
+    assert Triplanar(x=half, z=Constant(color=2)).brightness() == pytest.approx(1.25)
+    assert sr.Principled(emission=UvTransform(texture=half, scale=3)).glow == 0.5
+    assert sr.Principled(emission=(1, 2, 3)).glow == 2

@@ -14,10 +14,10 @@ from typing import NamedTuple
 from sightray._jit import kernel
 from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, advance, i64_at, table_at
+from sightray.mathlib.table import Table, advance, i64_at, table_at, vec3_at
 from sightray.mathlib.transform import transform_normal, transform_point, transform_vector
-from sightray.mathlib.vec import Vec3, normalize
-from sightray.shapes.base import Surface, intersect, occluded, surface
+from sightray.mathlib.vec import Vec3, cross, dot, length, normalize
+from sightray.shapes.base import Surface, handedness, intersect, occluded, surface
 from sightray.shapes.moving import normal_in_moving, point_in_moving
 
 SHAPE, MATERIAL, MOVED, OBJECT, LIGHT, FLAGS = 0, 1, 2, 3, 4, 5
@@ -113,6 +113,25 @@ def normal_in_object_at(item: Table, n: Vec3, time: f64) -> Vec3:
     if moved == MOVING:
         return normalize(normal_in_moving(table_at(item, MET), n, time))
     return normalize(transform_normal(item, WORLD_FROM_OBJECT, n))
+
+
+@kernel
+def object_scale(item: Table, along: Vec3) -> f64:
+    """How long a metre of the world is in the item's object space, about; measured along a tangent."""
+    size = length(along)
+    if i64_at(item, MOVED) != PLACED or not size > 0.0:
+        return 1.0
+    return length(transform_vector(item, OBJECT_FROM_WORLD, along)) / size
+
+
+@kernel
+def is_mirrored(item: Table, prim: i64) -> bool:
+    """Whether texture coordinates run over a primitive as in a mirror: u, v and the outward normal are left-handed."""
+    hand = handedness(table_at(item, SHAPE), prim)
+    if i64_at(item, MOVED) == PLACED:
+        m = OBJECT_FROM_WORLD
+        hand *= dot(vec3_at(item, m), cross(vec3_at(item, m + 4), vec3_at(item, m + 8)))
+    return hand < 0.0
 
 
 @kernel

@@ -43,7 +43,7 @@ def ambient_occlusion_radiance(integrator: Table, world: Table, ray: Ray, draws:
     hit = closest_solid(world, ray.origin, d, 0.0, math.inf)
     if hit.item < 0:
         return Radiance(grey(1.0), 1)
-    point = on_seen_side(point_of(world, hit, ray.origin, d, sight_beam(world, no_table())), d)
+    point = on_seen_side(point_of(world, hit, ray.origin, d, sight_beam(world, draws, no_table())), d)
 
     # Choose a direction on the side that is seen, and look whether it is open.
     way = pair(draws, WAY)

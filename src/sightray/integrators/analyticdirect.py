@@ -55,7 +55,7 @@ def analytic_direct_radiance(integrator: Table, world: Table, ray: Ray, draws: D
     hit = closest_solid(world, ray.origin, d, 0.0, math.inf)
     if hit.item < 0:
         return Radiance(background(world, d), 1)
-    point = on_seen_side(point_of(world, hit, ray.origin, d, sight_beam(world, no_table())), d)
+    point = on_seen_side(point_of(world, hit, ray.origin, d, sight_beam(world, draws, no_table())), d)
     n = point.shading if point.cos_view >= 0.0 else -point.shading
     t_min = first_step(math.nan, point.p, hit.t)
     start, arrived = lifted(world, hit, point), grey(0.0)

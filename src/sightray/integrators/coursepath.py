@@ -67,7 +67,7 @@ def course_path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws
         if hit.item < 0:
             color += beta * behind(search, world, start, n, d, density)
             break
-        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world, no_table())), d)
+        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world, draws, no_table())), d)
         own_light = emitted(point.material, point.where, point.cos_view)
         if max3(own_light) > 0.0:
             color += beta * own_light * chance(search, world, point.light, start, n, d, hit.t, density)

@@ -10,7 +10,7 @@ from sightray.integrators.base import Radiance
 from sightray.integrators.nesting import Nest, crossing
 from sightray.integrators.shading import Frame, first_step, into
 from sightray.integrators.terminator import shadow_ray
-from sightray.lights.base import WHOLE, direction_density, illuminate, sky
+from sightray.lights.base import WHOLE, direction_density, illuminate, light_in, sky
 from sightray.materials.base import bsdf
 from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64, i64
@@ -66,7 +66,7 @@ def direct_light(
     sample = illuminate(light, point.p, WHOLE, place.u, place.v)
     wi = into(frame, sample.direction)
     answer = bsdf(point.material, point.where, wo, wi)
-    found = answer.value * as_light(bands, sample.irradiance) * (1.0 / chosen.probability)
+    found = answer.value * light_in(bands, light, sample.irradiance) * (1.0 / chosen.probability)
     if max4(found) <= 0.0:
         return Radiance(grey(0.0), 0)
     behind = crossing(world, nest, point, sample.direction) if wo.z * wi.z < 0.0 else nest
@@ -88,7 +88,7 @@ def direct_light_within(world: Table, p: Vec3, d: Vec3, nest: Nest, bands: Table
     light = light_at(world, chosen.light)
     sample = illuminate(light, p, WHOLE, place.u, place.v)
     density = phase(nest.here, dot(d, sample.direction))
-    found = as_light(bands, sample.irradiance) * (density / chosen.probability)
+    found = light_in(bands, light, sample.irradiance) * (density / chosen.probability)
     if max4(found) <= 0.0:
         return Radiance(grey(0.0), 0)
     before = (sample.distance - first_step(math.nan, p, 0.0)) * (1.0 - 1e-9)  # the light's own surface is no obstacle
@@ -137,12 +137,13 @@ def chance_weight(world: Table, light: i64, p: Vec3, n: Vec3, d: Vec3, distance:
 
 
 @kernel
-def light_of_skies(world: Table, p: Vec3, n: Vec3, d: Vec3, density: f64) -> Vec3:
-    """Radiance, RGB, where a ray from p meets nothing, weighed as `chance_weight` does."""
-    color = vec3_at(world, BACKGROUND)
+def light_of_skies(world: Table, p: Vec3, n: Vec3, d: Vec3, density: f64, bands: Table) -> Vec3:
+    """Radiance, in the path's lanes, where a ray from p meets nothing, weighed as `chance_weight` does."""
+    color = as_light(bands, vec3_at(world, BACKGROUND))
     for k in range(i64_at(world, SKY_COUNT)):
-        light = i64_at(table_at(world, SKIES), k)
-        color += sky(light_at(world, light), d) * chance_weight(world, light, p, n, d, math.inf, density)
+        index = i64_at(table_at(world, SKIES), k)
+        light = light_at(world, index)
+        color += light_in(bands, light, sky(light, d)) * chance_weight(world, index, p, n, d, math.inf, density)
     return color
 
 

@@ -57,7 +57,7 @@ def direct_lighting_radiance(integrator: Table, world: Table, ray: Ray, draws: D
     search = Search(i64_at(integrator, STRATEGY), BRDF, i64_at(integrator, LIGHT_SAMPLES), every)
     o, d = ray.origin, ray.direction
     color, beta = grey(0.0), grey(1.0)  # beta: path throughput
-    nest, beam = outside(world), sight_beam(world, no_table())
+    nest, beam = outside(world), sight_beam(world, draws, no_table())
     # Where the direction d was chosen, the normal there, and with which density; 0 for rays of sight and mirrors.
     start, n, density, gone = o, grey(0.0), 0.0, 0.0
     t_min = 0.0

@@ -23,13 +23,13 @@ from sightray.integrators.nesting import crossing, outside
 from sightray.integrators.shading import first_step, frame_of, into, on_true_side, out_of
 from sightray.integrators.spectral import choose_bands, seen_colour
 from sightray.integrators.terminator import lifted
-from sightray.materials.base import emitted, interior, sample_bsdf
-from sightray.mathlib.bands import BANDS_WORDS, as_light, ones
+from sightray.materials.base import emitted, glow_in, interior, sample_bsdf
+from sightray.mathlib.bands import BANDS_WORDS, ones
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table, scratch, table_at
 from sightray.mathlib.vec import Vec3, grey, max4
 from sightray.media.base import sample_distance, sample_phase, transmittance
-from sightray.samplers.base import Draws, nested, number, pair
+from sightray.samplers.base import Draws, nested, number, one_of, pair
 from sightray.scene.world import Beam, Point, find_closest, light_count, on_seen_side, point_of, sight_beam
 from sightray.spectra.upsampling import band_table
 
@@ -53,6 +53,9 @@ class PathTracer(Integrator):
 
     max_depth: int = integer("bounces after the ray of sight", default=8, at_least=0, at_most=1000)
     roulette_depth: int = integer("bounces before Russian roulette begins", default=4, at_least=0)
+    light_samples: int = integer(
+        "shadow rays from the first surface of a path; more where the noise is that of direct light", default=1,
+        at_least=1, at_most=1024)  # fmt: skip
     clamp: float | None = real(
         "most that one walk may add after its first bounce, against fireflies; None for no bias", default=None, above=0,
         optional=True)  # fmt: skip
@@ -60,7 +63,7 @@ class PathTracer(Integrator):
     _bands: Any = derived_array("table of spectra, if spectral", lambda p: band_table() if p.spectral else None)
 
 
-DEPTH, ROULETTE_DEPTH, CLAMP, _, BAND_TABLE = PathTracer.offsets()
+DEPTH, ROULETTE_DEPTH, LIGHT_SAMPLES, CLAMP, _, BAND_TABLE = PathTracer.offsets()
 
 # Dimensions of a bounce's draws, beside those of direct.py, and the number of the nested ones for a medium.
 WAVELENGTH, WAY, CHOICE, MEDIUM = 0, 0, 1, 0
@@ -86,7 +89,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
     o, d = ray.origin, ray.direction
     color, beta = grey(0.0), ones(bands)  # beta: path throughput
     nest = outside(world)
-    beam = sight_beam(world, bands)
+    beam = sight_beam(world, draws, bands)
     # Where the direction d was chosen, the normal there, and with which density; 0 for rays of sight and mirrors.
     start, n, density, gone = o, grey(0.0), 0.0, 0.0
     t_min = 0.0
@@ -120,7 +123,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
 
         # Take the light that the nearest surface gives off, unless looking for lights has taken it already.
         if hit.item < 0:
-            behind = as_light(bands, light_of_skies(world, start, n, d, density))
+            behind = light_of_skies(world, start, n, d, density, bands)
             color += limited(integrator, beta * behind, depth)
             break
         point = on_seen_side(point_of(world, hit, o, d, beam), d)
@@ -132,7 +135,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
             continue
         if point.cos_view < 0.0 and nest.depth == 0:
             beta = beta * darkened(point, o, d, hit.t, bands, own)
-        own_light = as_light(bands, emitted(point.material, point.where, point.cos_view))
+        own_light = glow_in(bands, point.material, emitted(point.material, point.where, point.cos_view))
         if max4(own_light) > 0.0:
             weight = chance_weight(world, point.light, start, n, d, gone, density)
             color += limited(integrator, beta * own_light * weight, depth)
@@ -145,9 +148,12 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         way, choice = pair(own, WAY), pair(own, CHOICE)
         chosen = sample_bsdf(point.material, point.where, wo, way.u, way.v, choice.u)
         if light_count(world) > 0:
-            direct = direct_light(world, point, lifted(world, hit, point), frame, wo, t_min, nest, bands, own)
-            rays += direct.rays
-            color += limited(integrator, beta * direct.color, depth + 1)
+            lit_from = lifted(world, hit, point)
+            count = i64_at(integrator, LIGHT_SAMPLES) if depth == 0 else 1
+            for k in range(count):
+                direct = direct_light(world, point, lit_from, frame, wo, t_min, nest, bands, one_of(own, k, count))
+                rays += direct.rays
+                color += limited(integrator, beta * direct.color, depth + 1) * (1.0 / count)
 
         # Go on in a direction that the material chooses, or end the walk if it has become unimportant.
         beta = beta * chosen.weight

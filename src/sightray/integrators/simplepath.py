@@ -45,7 +45,7 @@ def simple_path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws
         if hit.item < 0:
             color += beta * background(world, d)
             break
-        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world, no_table())), d)
+        point = on_seen_side(point_of(world, hit, o, d, sight_beam(world, draws, no_table())), d)
         if point.cos_view < 0.0:
             inside = interior(point.material)
             if not is_null(inside):

@@ -123,7 +123,7 @@ def whitted_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) ->
             continue
 
         # Light the point where it is seen; light lost inside glass on the way dims all that follows.
-        point = point_of(world, hit, o, d, sight_beam(world, no_table()))
+        point = point_of(world, hit, o, d, sight_beam(world, draws, no_table()))
         if i64_at(integrator, TWO_SIDED) != 0:
             point = on_seen_side(point, d)
         terms = local(point.material, point.where, point.cos_view)

@@ -8,10 +8,12 @@ an unbiased sum (R. Cook, "Stochastic sampling in computer graphics", ACM TOG 5(
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from sightray._jit import implements, kernel
-from sightray.fields import Color, color, flag, integer
-from sightray.lights.base import WHOLE, Light, LightSample, cells
+from sightray.fields import Color, color, derived_vector, flag, integer
+from sightray.lights.base import WHOLE, LightSample, cells
+from sightray.lights.lit import _Lit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey
@@ -19,15 +21,16 @@ from sightray.mathlib.vec import Vec3, dot, grey
 MAX_GRID = 64
 
 
-class _AreaLight(Light):
+class _AreaLight(_Lit):
     """Base of lights with an area: `radiance` in all directions from every point, cut into `grid` x `grid` cells."""
 
     radiance: Color = color("radiance that it gives off", default=1.0, unit="W/(m² sr)")
     grid: int = integer("cells along a side: grid x grid shadow rays", default=4, at_least=1, at_most=MAX_GRID)
     visible: bool = flag("whether rays of sight see it", default=True)
+    _shown: Any = derived_vector("radiance in RGB", lambda light: light.shown())
 
 
-RADIANCE, GRID, VISIBLE = _AreaLight.offsets()
+_, GRID, VISIBLE, RADIANCE = _AreaLight.offsets()[1:]
 
 
 @implements(cells, _AreaLight)

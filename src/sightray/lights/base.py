@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sightray._jit import implements, method
+from sightray._jit import implements, kernel, method
+from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table
+from sightray.mathlib.table import Table, is_null
 from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 
@@ -117,6 +118,23 @@ def sky(light: Table, d: Vec3) -> Vec3:
 def polygon(light: Table, p: Vec3) -> LightPolygon:
     """The light as a polygon of even radiance, seen from p: what exact irradiance can be computed of."""
     raise NotImplementedError
+
+
+@method(5)
+def in_lanes(light: Table, bands: Table, rgb: Vec3) -> Vec3:
+    """Light that the light sent, and that is known as RGB, at the wavelengths of a spectral path."""
+    raise NotImplementedError
+
+
+@implements(in_lanes, Light)
+def up_sampled(light: Table, bands: Table, rgb: Vec3) -> Vec3:
+    return as_light(bands, rgb)
+
+
+@kernel
+def light_in(bands: Table, light: Table, rgb: Vec3) -> Vec3:
+    """Light that a light sent, in the path's lanes."""
+    return rgb if is_null(bands) else in_lanes(light, bands, rgb)
 
 
 @implements(polygon, Light)

@@ -7,14 +7,15 @@ from typing import Any
 
 from sightray._jit import implements
 from sightray.fields import Color, Point, color, derived_vector, vector
-from sightray.lights.base import Light, LightSample, illuminate
+from sightray.lights.base import LightSample, illuminate
+from sightray.lights.lit import _Lit
 from sightray.mathlib.axes import unit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, vec3_at
 from sightray.mathlib.vec import Vec3
 
 
-class DirectionalLight(Light):
+class DirectionalLight(_Lit):
     """Parallel light that travels along `direction` and brings the same `irradiance` everywhere.
 
     `direction` is the way that the light goes, away from the sun, as in the glTF format; formats that state the way
@@ -24,9 +25,13 @@ class DirectionalLight(Light):
     direction: Point = vector("the way that the light travels", default=(0.0, -1.0, 0.0), nonzero=True)
     irradiance: Color = color("irradiance of a surface that faces the light", default=1.0, unit="W/m²")
     _to_light: Any = derived_vector("unit vector towards the light", lambda light: -unit(light.direction))
+    _shown: Any = derived_vector("irradiance in RGB", lambda light: light.shown())
+
+    def color_of_light(self) -> Any:
+        return self.irradiance
 
 
-_, IRRADIANCE, TO_LIGHT = DirectionalLight.offsets()
+_, _, TO_LIGHT, IRRADIANCE = DirectionalLight.offsets()[1:]
 
 
 @implements(illuminate, DirectionalLight)

@@ -58,11 +58,11 @@ class DiskLight(_AreaLight):
 
         if not self.visible:
             return None
-        material = Emitter(radiance=self.radiance, two_sided=self.two_sided)
+        material = Emitter(radiance=self.radiance, spectrum=self.spectrum, two_sided=self.two_sided)
         return Disk(center=self.center, normal=self.normal, radius=self.radius, material=material)
 
 
-CENTER, _, RADIUS, TWO_SIDED, NORMAL, ACROSS, ALONG = DiskLight.offsets()[3:]
+CENTER, _, RADIUS, TWO_SIDED, NORMAL, ACROSS, ALONG = DiskLight.offsets()[5:]
 
 
 @implements(illuminate, DiskLight)

@@ -11,7 +11,8 @@ from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Color, color, derived_array, derived_integer, derived_vector, integer, other
 from sightray.lights.area import MAX_GRID, cut, place_in_cells
-from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, sky
+from sightray.lights.base import LightSample, cells, direction_density, illuminate, sky
+from sightray.lights.lit import _Lit
 from sightray.lights.picture import LUMINANCE, picture, pixel_at, radiant_pixels
 from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
 from sightray.mathlib.scalars import f64, i64
@@ -32,7 +33,7 @@ def _rotation(value: Any) -> Transform:
     return turn
 
 
-class EnvironmentLight(Light):
+class EnvironmentLight(_Lit):
     """Light from infinitely far away: `radiance` times a picture of all directions, or `radiance` alone.
 
     The picture is in the lat-long (equirectangular) projection: rows are even in the angle from +y, which is the top
@@ -48,7 +49,7 @@ class EnvironmentLight(Light):
     Directions are chosen in proportion to luminance times solid angle, pixel by pixel. A pixel's luminance is the mean
     over its area of what the lookup between pixels gives, which is (1, 6, 1)/8 of it and its neighbours along either
     axis, so that no light is left out. The picture takes 20 bytes a pixel. `grid` cells divide the picture's light,
-    not its area.
+    not its area. Where a `spectrum` is stated, all of the picture has it: its pixels count by their luminance.
 
     Reference: M. Pharr, W. Jakob, G. Humphreys, Physically Based Rendering, 4th ed. 2023, section 12.5.
     """
@@ -66,6 +67,7 @@ class EnvironmentLight(Light):
     _pixels: Any = derived_array("colours, three floats each", lambda e: e.pixels)
     _edges: Any = derived_array("cosines of the angles from +y of the rows' edges, height + 1", lambda e: e.edges())
     _sums: Any = derived_array("cumulated weights of the pixels", lambda e: cumulated(e.weights()))
+    _shown: Any = derived_vector("radiance in RGB", lambda light: light.shown())
 
     @property
     def infinite(self) -> bool:
@@ -84,6 +86,9 @@ class EnvironmentLight(Light):
         """Read the file once, so that a missing one is an error where the light is stated."""
         white = np.ones((1, 1, 3), np.float32)
         found = white if self.image is None else radiant_pixels(self.image, "EnvironmentLight")
+        if self.spectrum is not None and self.image is not None:  # of the picture, its brightness counts
+            found = np.repeat((found.astype(np.float64) @ LUMINANCE)[..., None], 3, axis=2).astype(np.float32)
+            found.flags.writeable = False
         object.__setattr__(self, "_picture", found)
 
     def weights(self) -> np.ndarray:
@@ -95,7 +100,7 @@ class EnvironmentLight(Light):
         return bright * -np.diff(self.edges())[:, None]
 
 
-RADIANCE, GRID, X, Y, Z, WIDTH, HEIGHT, PIXELS, EDGES, SUMS = EnvironmentLight.offsets()
+_, GRID, X, Y, Z, WIDTH, HEIGHT, PIXELS, EDGES, SUMS, RADIANCE = EnvironmentLight.offsets()[1:]
 
 
 @implements(cells, EnvironmentLight)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sightray._jit import implements
 from sightray.errors import SceneError
-from sightray.fields import Color, Point, color, vector
-from sightray.lights.base import Light, LightBounds, LightSample, around, illuminate
+from sightray.fields import Color, Point, color, derived_vector, vector
+from sightray.lights.base import LightBounds, LightSample, around, illuminate
+from sightray.lights.lit import _Lit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, vec3_at
 from sightray.mathlib.vec import Vec3, length
 
 
-class PointLight(Light):
+class PointLight(_Lit):
     """Sends `intensity` equally in all directions.
 
     What arrives at distance r is ``intensity / (c + l r + q r²)``: the inverse square law by default, or the constant,
@@ -21,6 +24,10 @@ class PointLight(Light):
     position: Point = vector("where it stands", unit="m")
     intensity: Color = color("radiant intensity", default=1.0, unit="W/sr")
     attenuation: Point = vector("constant, linear and quadratic coefficient", default=(0.0, 0.0, 1.0))
+    _shown: Any = derived_vector("intensity in RGB", lambda light: light.shown())
+
+    def color_of_light(self) -> Any:
+        return self.intensity
 
     def check(self) -> None:
         if min(self.attenuation) < 0 or max(self.attenuation) <= 0:
@@ -30,7 +37,7 @@ class PointLight(Light):
         return around(self.position, 0.0, self.intensity)
 
 
-POSITION, INTENSITY, ATTENUATION = PointLight.offsets()
+POSITION, _, ATTENUATION, INTENSITY = PointLight.offsets()[1:]
 
 
 @implements(illuminate, PointLight)

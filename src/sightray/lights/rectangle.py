@@ -76,11 +76,11 @@ class RectangleLight(_AreaLight):
 
         if not self.visible:
             return None
-        material = Emitter(radiance=self.radiance, two_sided=self.two_sided)
+        material = Emitter(radiance=self.radiance, spectrum=self.spectrum, two_sided=self.two_sided)
         return Rectangle(corner=self.corner, edge_u=self.edge_u, edge_v=self.edge_v, material=material)
 
 
-CORNER, EDGE_U, EDGE_V, TWO_SIDED, NORMAL, AREA, UPRIGHT = RectangleLight.offsets()[3:]
+CORNER, EDGE_U, EDGE_V, TWO_SIDED, NORMAL, AREA, UPRIGHT = RectangleLight.offsets()[5:]
 
 
 @kernel

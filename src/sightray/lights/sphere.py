@@ -48,10 +48,11 @@ class SphereLight(_AreaLight):
 
         if not self.visible:
             return None
-        return Sphere(center=self.center, radius=self.radius, material=Emitter(radiance=self.radiance))
+        material = Emitter(radiance=self.radiance, spectrum=self.spectrum)
+        return Sphere(center=self.center, radius=self.radius, material=material)
 
 
-CENTER, RADIUS = SphereLight.offsets()[3:]
+CENTER, RADIUS = SphereLight.offsets()[5:]
 
 
 @kernel

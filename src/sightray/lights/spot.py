@@ -10,7 +10,8 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Color, Point, color, derived_number, derived_vector, number, vector
-from sightray.lights.base import Light, LightBounds, LightSample, illuminate
+from sightray.lights.base import LightBounds, LightSample, illuminate
+from sightray.lights.lit import _Lit
 from sightray.mathlib.axes import unit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, vec3_at
@@ -21,7 +22,7 @@ def _half(spot: Any) -> float:
     return math.radians(spot.angle) / 2
 
 
-class SpotLight(Light):
+class SpotLight(_Lit):
     """Stands at `position` and shines towards `target`, into a cone whose full opening angle is `angle`.
 
     Within ``1 - blend`` of the half-angle it shines with full `intensity`; from there to the cone's surface it fades
@@ -40,6 +41,10 @@ class SpotLight(Light):
     _axis: Any = derived_vector("unit vector from the light to the target", lambda spot: spot.axis())
     _cos_outer: Any = derived_number("where light ends", lambda spot: math.cos(_half(spot)))
     _cos_inner: Any = derived_number("where it starts to fade", lambda spot: math.cos(_half(spot) * (1 - spot.blend)))
+    _shown: Any = derived_vector("intensity in RGB", lambda light: light.shown())
+
+    def color_of_light(self) -> Any:
+        return self.intensity
 
     def axis(self) -> np.ndarray:
         """Unit vector from the light towards its target, (3,) float64."""
@@ -56,7 +61,7 @@ class SpotLight(Light):
         return LightBounds(at, at, self.axis(), _half(self), 1e-3, float(np.mean(self.intensity)))
 
 
-POSITION, _, INTENSITY, _, _, ATTENUATION, AXIS, COS_OUTER, COS_INNER = SpotLight.offsets()
+POSITION, _, _, _, _, ATTENUATION, AXIS, COS_OUTER, COS_INNER, INTENSITY = SpotLight.offsets()[1:]
 
 
 @kernel

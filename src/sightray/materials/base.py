@@ -23,9 +23,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from sightray._jit import implements, method
+from sightray._jit import implements, kernel, method
+from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, no_table
+from sightray.mathlib.table import Table, is_null, no_table
 from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
 from sightray.textures.base import Texture, Where
@@ -168,6 +169,23 @@ def bent_normal(material: Table, where: Where, stretch: f64) -> Vec3:
     `stretch`: metres of the surface per unit of u.
     """
     raise NotImplementedError
+
+
+@method(7)
+def glow_in_lanes(material: Table, bands: Table, rgb: Vec3) -> Vec3:
+    """Light that the material gave off, and that is known as RGB, at the wavelengths of a spectral path."""
+    raise NotImplementedError
+
+
+@implements(glow_in_lanes, Material)
+def up_sampled(material: Table, bands: Table, rgb: Vec3) -> Vec3:
+    return as_light(bands, rgb)
+
+
+@kernel
+def glow_in(bands: Table, material: Table, rgb: Vec3) -> Vec3:
+    """Light that a material gave off, in the path's lanes."""
+    return rgb if is_null(bands) else glow_in_lanes(material, bands, rgb)
 
 
 @implements(sample_bsdf, Material)

@@ -42,16 +42,17 @@ def missing_of_glass(kind: int, eta: float, anisotropy: float = 0.0) -> Array:
 
 
 @cache
-def reflected_by_glass(kind: int, eta: float) -> Array:
+def reflected_by_glass(kind: int, eta: float, anisotropy: float = 0.0) -> Array:
     """The light that a rough dielectric reflects, over that which a smooth one would.
 
     That is what does not reach the colour below a varnish. The means at the end are those of the light itself.
     """
-    ratios = []
-    for r, roughness in enumerate(ROUGHNESS_NODES):
-        smooth = fresnel_share(cosines_at(float(roughness**2)), eta)
-        ratios.append((1.0 - _row(kind, 0.0, 1.0, r, lambda f: f.share(eta) * f.reflected)) / smooth)
-    return with_means(np.array([ratios]), lambda cosine: fresnel_share(cosine, eta))
+    smooth = np.array([fresnel_share(cosines_at(float(roughness**2)), eta) for roughness in ROUGHNESS_NODES])
+    rows = [
+        [1.0 - _row(kind, anisotropy, c, r, lambda f: f.share(eta) * f.reflected) for r in range(ROUGHNESSES)]
+        for c in _azimuths(anisotropy)
+    ]
+    return with_means(np.array(rows) / smooth, lambda cosine: fresnel_share(cosine, eta))
 
 
 class _Facets:
@@ -149,10 +150,14 @@ def _visible_slopes(w: Array) -> tuple[Array, Array]:
 
 def _table(kind: int, anisotropy: float, leaving: Callable[[_Facets], Array]) -> Array:
     """1 minus the mean of `leaving` over visible facets, for all nodes; then the means over the hemisphere."""
-    azimuths = AZIMUTHS if anisotropy else 1
-    along = np.sqrt(np.arange(azimuths) / max(1, azimuths - 1))
-    rows = [[_row(kind, anisotropy, c, r, leaving) for r in range(ROUGHNESSES)] for c in along]
+    rows = [[_row(kind, anisotropy, c, r, leaving) for r in range(ROUGHNESSES)] for c in _azimuths(anisotropy)]
     return with_means(np.clip(rows, 0.0, 1.0))
+
+
+def _azimuths(anisotropy: float) -> Array:
+    """Cosines of the nodes' azimuths: a single one, 0 or any, where the surface is the same all around."""
+    nodes = AZIMUTHS if anisotropy else 1
+    return np.sqrt(np.arange(nodes) / max(1, nodes - 1))
 
 
 def _row(kind: int, anisotropy: float, along: float, r: int, leaving: Callable[[_Facets], Array]) -> Array:

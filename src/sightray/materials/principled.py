@@ -51,7 +51,8 @@ class Principled(Material):
 
     - a **base**: `metallic` of it is metal, GGX facets with Schlick's reflectance from `base_color` head-on to white;
       the rest is a dielectric of index `ior` that reflects colourlessly, `specular` times as much as Fresnel says, and
-      below that `transmission` of it is clear, the others matte, both of `base_color`. All have the same `roughness`.
+      below that `transmission` of it is clear, the others matte, both of `base_color`. All have the same `roughness`,
+      and with `anisotropy` above 0 highlights that are long along u, below 0 across it, as on brushed metal.
     - a **sheen** of fibres of the colour `sheen` (`sheen.py`);
     - a **clear coat**, `clearcoat` times a varnish of index 1.5 with its own roughness.
 
@@ -71,6 +72,7 @@ class Principled(Material):
                                at_most=1.0)  # fmt: skip
     metallic: Any = data("share of metal", default=0.0)
     roughness: Any = data("perceived roughness of the base", default=0.5)
+    anisotropy: float = number("how much that depends on the direction", default=0.0, at_least=-1, at_most=1)
     ior: float = number("refractive index of the dielectric", default=1.5, at_least=1)
     specular: Any = data("factor on what the opaque dielectric reflects colourlessly", default=1.0)
     clearcoat: Any = data("strength of the clear coat", default=0.0)
@@ -86,8 +88,10 @@ class Principled(Material):
     _inside: Any = derived_child("the medium inside, if there is one", lambda p: p.inside())
     _stain: Any = derived_vector("its absorption as Whitted's model sees it",
                                  lambda p: stain(p) if p.inside() else (0.0,) * 3)  # fmt: skip
-    _metal: Any = derived_array("energy that single reflections of metal lose", lambda p: missing_of_mirrors(GGX))
-    _varnish: Any = derived_array("what the dielectric reflects", lambda p: reflected_by_glass(GGX, 1.0 / p.ior))
+    _metal: Any = derived_array("energy that single reflections of metal lose",
+                                lambda p: missing_of_mirrors(GGX, p.anisotropy))  # fmt: skip
+    _varnish: Any = derived_array("what the dielectric reflects",
+                                  lambda p: reflected_by_glass(GGX, 1.0 / p.ior, p.anisotropy))  # fmt: skip
     _coat: Any = derived_array("what the coat reflects", lambda p: p.coat())
     _sheen: Any = derived_array("what the sheen reflects", lambda p: sheen_table() if _there(p.sheen) else None)
     _glass_out: Any = derived_array("energy that single passages lose, from outside", lambda p: p.missing(1.0 / p.ior))
@@ -101,6 +105,10 @@ class Principled(Material):
         check_body(self)
 
     @property
+    def oriented(self) -> bool:
+        return self.anisotropy != 0
+
+    @property
     def translucent(self) -> bool:
         return _there(self.transmission)
 
@@ -111,7 +119,7 @@ class Principled(Material):
     @property
     def glow(self) -> float:
         if not isinstance(self.emission, tuple):
-            return 1.0
+            return self.emission.brightness()
         return sum(self.emission) / 3
 
     def inside(self) -> Any:
@@ -124,7 +132,9 @@ class Principled(Material):
 
     def missing(self, eta: float) -> Any:
         """The table of energy.py for one side of what is clear, if anything is."""
-        return missing_of_glass(GGX, eta) if _there(self.transmission) and not self.thin_walled else None
+        return (
+            missing_of_glass(GGX, eta, self.anisotropy) if _there(self.transmission) and not self.thin_walled else None
+        )
 
 
 def _there(value: Any) -> bool:
@@ -133,9 +143,9 @@ def _there(value: Any) -> bool:
 
 
 (
-    BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR, CLEARCOAT, CLEARCOAT_ROUGHNESS, SHEEN, SHEEN_ROUGHNESS,
-    TRANSMISSION, THIN_WALLED, ABSORPTION, EMISSION, INSIDE, STAIN, METAL_TABLE, VARNISH_TABLE, COAT_TABLE, SHEEN_TABLE,
-    GLASS_OUT, GLASS_IN, ENTERS, LEAVES,
+    BASE_COLOR, METALLIC, ROUGHNESS, ANISOTROPY, IOR, SPECULAR, CLEARCOAT, CLEARCOAT_ROUGHNESS, SHEEN,
+    SHEEN_ROUGHNESS, TRANSMISSION, THIN_WALLED, ABSORPTION, EMISSION, INSIDE, STAIN, METAL_TABLE, VARNISH_TABLE,
+    COAT_TABLE, SHEEN_TABLE, GLASS_OUT, GLASS_IN, ENTERS, LEAVES,
 ) = Principled.offsets()  # fmt: skip
 SMOOTHEST = 0.0316  # roughness, for an alpha of 0.001: like a mirror, but lights without extent show in it
 
@@ -144,7 +154,7 @@ SMOOTHEST = 0.0316  # roughness, for an alpha of 0.001: like a mirror, but light
 def boundary_seen(material: Table, roughness: f64, outside: bool) -> Boundary:
     """The boundary of a clear body from the viewer's side; for others, one that is never asked."""
     out, within = table_at(material, GLASS_OUT), table_at(material, GLASS_IN)
-    shape, ior = facets(GGX, roughness, 0.0), f64_at(material, IOR)
+    shape, ior = facets(GGX, roughness, f64_at(material, ANISOTROPY)), f64_at(material, IOR)
     if is_null(out):
         return Boundary(shape, roughness, 1.0 / ior, out, within, 0.0)
     if outside:

@@ -6,8 +6,18 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import child
-from sightray.materials.base import BsdfSample, BsdfValue, Local, bsdf, emitted, local, sample_bsdf
+from sightray.materials.base import (
+    BsdfSample,
+    BsdfValue,
+    Local,
+    bsdf,
+    emitted,
+    glow_in_lanes,
+    local,
+    sample_bsdf,
+)
 from sightray.materials.wrapper import INNER, _Wrapper
+from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, is_null, table_at
 from sightray.mathlib.vec import Vec3
@@ -67,3 +77,8 @@ def bsdf_of_two_sided(material: Table, where: Where, wo: Vec3, wi: Vec3) -> Bsdf
 @implements(emitted, TwoSided)
 def emitted_by_two_sided(material: Table, where: Where, cos_view: f64) -> Vec3:
     return emitted(side_of(material, cos_view), where, abs(cos_view))
+
+
+@implements(glow_in_lanes, TwoSided)
+def glow_of_either_side(material: Table, bands: Table, rgb: Vec3) -> Vec3:
+    return as_light(bands, rgb)

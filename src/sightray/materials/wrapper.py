@@ -14,6 +14,7 @@ from sightray.materials.base import (
     bent_normal,
     bsdf,
     emitted,
+    glow_in_lanes,
     interior,
     local,
     opacity,
@@ -80,6 +81,11 @@ def bsdf_within(material: Table, where: Where, wo: Vec3, wi: Vec3) -> BsdfValue:
 @implements(emitted, _Wrapper)
 def emitted_within(material: Table, where: Where, cos_view: f64) -> Vec3:
     return emitted(table_at(material, INNER), where, cos_view)
+
+
+@implements(glow_in_lanes, _Wrapper)
+def glow_within(material: Table, bands: Table, rgb: Vec3) -> Vec3:
+    return glow_in_lanes(table_at(material, INNER), bands, rgb)
 
 
 @implements(interior, _Wrapper)

@@ -88,6 +88,14 @@ def nested(draws: Draws, level: i64) -> Draws:
     )  # fmt: skip
 
 
+@kernel
+def one_of(draws: Draws, k: i64, count: i64) -> Draws:
+    """The draws of number k of `count` samples that stand in the place of one, spread as evenly as all others are."""
+    return Draws(
+        draws.sampler, draws.pixel, draws.key, draws.sample * count + k, draws.samples * count, draws.dimension
+    )  # fmt: skip
+
+
 def default_sampler() -> Sampler:
     """The sampler of pictures for which none is chosen."""
     from sightray.samplers.sobol import SobolSampler

@@ -23,12 +23,13 @@ from sightray.lights.base import (
     LightSample,
     direction_density,
     illuminate,
+    in_lanes,
     polygon,
 )
 from sightray.lights.disk import concentric
 from sightray.lights.sphere import cap_of, is_outside, toward_sphere
 from sightray.lights.window import Window, in_window, window_of
-from sightray.materials.base import emitted
+from sightray.materials.base import emitted, glow_in_lanes
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, no_table, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, length
@@ -200,6 +201,16 @@ def density_of_patch(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64:  # n
             return 1.0 / window.solid_angle
     cosine = abs(dot(l, vec3_at(light, NORMAL)))
     return distance * distance / (cosine * f64_at(light, AREA)) if cosine > 0.0 else 0.0
+
+
+@implements(in_lanes, _Patch)
+def patch_in_lanes(light: Table, bands: Table, rgb: Vec3) -> Vec3:
+    return glow_in_lanes(table_at(table_at(light, ITEM), MATERIAL), bands, rgb)
+
+
+@implements(in_lanes, _Ball)
+def ball_in_lanes(light: Table, bands: Table, rgb: Vec3) -> Vec3:
+    return glow_in_lanes(table_at(table_at(light, ITEM), MATERIAL), bands, rgb)
 
 
 @implements(polygon, _Patch)

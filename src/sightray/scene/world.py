@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sightray._jit import kernel
@@ -14,9 +15,11 @@ from sightray.accelerators.item import (
     MATERIAL,
     PATTERNED,
     ItemHit,
+    is_mirrored,
     item_at,
     item_surface,
     normal_in_object_at,
+    object_scale,
     to_object,
 )
 from sightray.accelerators.item import FLAGS as ITEM_FLAGS
@@ -28,6 +31,7 @@ from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, no_table, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, cross, dot, length, normalize
+from sightray.samplers.base import Draws
 from sightray.textures.base import Where
 
 TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4
@@ -71,10 +75,14 @@ def thin_beam() -> Beam:
 
 
 @kernel
-def sight_beam(world: Table, bands: Table) -> Beam:
-    """A ray of sight, as wide as the camera's pixels."""
+def sight_beam(world: Table, draws: Draws, bands: Table) -> Beam:
+    """A ray of sight: as wide as the camera's pixels, less what other samples of the pixel see beside it.
+
+    Where it is not known how many there will be, those that came before count; so pictures grow sharper as they go on.
+    """
     camera = table_at(world, CAMERA)
-    return Beam(f64_at(camera, APART), f64_at(camera, SPREAD), bands)
+    share = 1.0 / math.sqrt(max(draws.samples, draws.sample + 1))
+    return Beam(f64_at(camera, APART) * share, f64_at(camera, SPREAD) * share, bands)
 
 
 @kernel
@@ -132,10 +140,16 @@ def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3, beam: Beam) -> Point:
     if flags & (PATTERNED | BUMPY) != 0:
         stretch = length(s.tangent)
         slant = max(abs(dot(n, d)), SLANT)  # a footprint is long where a surface is seen at a slant
-        width = (beam.width + beam.spread * hit.t) / (stretch * slant) if stretch > 0.0 else 0.0
-        where = Where(s.u, s.v, p_object, normal_in_object_at(item, s.normal, o.w), width, beam.bands)
+        reach = (beam.width + beam.spread * hit.t) / slant
+        width = reach / stretch if stretch > 0.0 else 0.0
+        inner = normal_in_object_at(item, s.normal, o.w)
+        inner = Vec3(inner.x, inner.y, inner.z, reach * object_scale(item, s.tangent))
+        where = Where(s.u, s.v, p_object, inner, width, beam.bands)
         if flags & BUMPY != 0:
-            shading = bent(shading, s.tangent, bent_normal(material, where, stretch))
+            tilted = bent_normal(material, where, stretch)
+            if is_mirrored(item, hit.prim):
+                tilted = Vec3(tilted.x, -tilted.y, tilted.z)
+            shading = bent(shading, s.tangent, tilted)
     light = i64_at(item, LIGHT) + i64_at(item, LIGHT_STEP) * hit.prim
     return Point(
         p, n, shading, -dot(shading, d), material, where, light, s.tangent, flags,

@@ -39,5 +39,5 @@ def build() -> sr.Scene:
     return sr.Scene(
         pot, floor, sr.EnvironmentLight(image=sky(), grid=2),
         camera=sr.PerspectiveCamera(eye=(2.6, 4.6, 8.6), target=(0.1, 1.2, 0), vfov=34, width=512, height=384),
-        samples=64, integrator=sr.PathTracer(max_depth=6), name="teapot-under-sky",
+        samples=64, integrator=sr.PathTracer(max_depth=6, light_samples=4), name="teapot-under-sky",
     )  # fmt: skip

@@ -21,7 +21,7 @@ import numpy as np
 from sightray._jit import implements, method
 from sightray.fields import child, other, text
 from sightray.mathlib.hit import Hit, is_hit
-from sightray.mathlib.scalars import f64
+from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table
 from sightray.mathlib.transform import Transform, as_transform
 from sightray.mathlib.vec import Vec3, grey
@@ -88,3 +88,14 @@ def as_round_as_it_is(shape: Table, hit: Hit, p: Vec3, side: f64) -> Vec3:
 @implements(occluded, Shape)
 def occluded_through_intersect(shape: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
     return is_hit(intersect(shape, o, d, t_min, t_max))
+
+
+@method(4)
+def handedness(shape: Table, prim: i64) -> f64:
+    """Positive where u, v and the outward normal are right-handed, negative where pictures are seen mirrored."""
+    raise NotImplementedError
+
+
+@implements(handedness, Shape)
+def right_handed(shape: Table, prim: i64) -> f64:
+    return 1.0

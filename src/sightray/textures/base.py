@@ -20,7 +20,7 @@ class Where(NamedTuple):
     u: f64  # texture coordinates; v runs upwards
     v: f64
     p: Vec3  # the point in the space of the shape, so that solid textures move with it
-    normal: Vec3  # unit, outward, geometric, in the space of the shape
+    normal: Vec3  # unit, outward, geometric, in the space of the shape; its 4th lane is the width there, see `reach`
     width: f64  # of the ray's footprint where it is longest, in units of u; 0 for a ray without width
     bands: Table  # what the lanes of colours stand for; null for RGB (see mathlib/bands.py)
 
@@ -36,6 +36,14 @@ class Texture(Member, family="textures"):
         children = {name: value for name, value in self.values().items() if isinstance(value, Texture)}
         numbers = {name: value.as_numbers() for name, value in children.items()}
         return self.replace(**numbers) if any(numbers[name] is not children[name] for name in numbers) else self
+
+    def brightness(self) -> float:
+        """About its mean over places and red, green and blue: for choosing among surfaces that glow.
+
+        Unless a member knows better, that of the colours and textures that it is made of.
+        """
+        stated = [value for name, value in self.values().items() if isinstance(self.given[name], Textured)]
+        return mean_brightness([value for value in stated if value is not None])
 
 
 @method(0)
@@ -64,9 +72,24 @@ def value_at(texture: Table, where: Where) -> Vec3:
 
 
 @kernel
+def reach(where: Where) -> f64:
+    """Width of the ray's footprint where it is longest, in metres of the space of the shape: for solid textures.
+
+    It travels in the 4th lane of the normal, as time does in that of points.
+    """
+    return where.normal.w
+
+
+@kernel
 def anywhere(u: f64, v: f64, p: Vec3) -> Where:
     """A place asked about by itself, outside of any picture: in RGB, by a ray without width."""
     return Where(u, v, p, Vec3(0.0, 0.0, 1.0), 0.0, no_table())
+
+
+def mean_brightness(colours: list[Any]) -> float:
+    """Mean over textures and linear colours."""
+    means = [c.brightness() if isinstance(c, Texture) else sum(c) / len(c) for c in colours]
+    return sum(means) / len(means)
 
 
 class Textured(Child):

@@ -89,6 +89,9 @@ class Bitmap(Texture):
             object.__setattr__(self, "_pyramid", pyramid(self.pixels, None if self.filter == "trilinear" else 1))
         return self.__dict__["_pyramid"]
 
+    def brightness(self) -> float:
+        return float(self.pixels.mean())
+
     def as_numbers(self) -> Bitmap:
         return self.replace(linear=True) if isinstance(self.image, Path) and not self.linear else self
 

@@ -14,6 +14,9 @@ class Constant(Texture):
 
     color: Color = color("linear Rec. 709 colour")
 
+    def brightness(self) -> float:
+        return sum(self.color) / 3
+
 
 (COLOR,) = Constant.offsets()
 

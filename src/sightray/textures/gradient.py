@@ -44,6 +44,9 @@ class Gradient(Texture):
         if self.begin == self.end:
             raise SceneError(f"Gradient.end: got {self.end:g}, which is begin; allowed: another number")
 
+    def brightness(self) -> float:
+        return float(self.colors.mean())
+
     def stops(self) -> np.ndarray:
         """Places and colours, (n, 4) float64."""
         places = np.linspace(0, 1, len(self.colors)) if self.places is None else self.places

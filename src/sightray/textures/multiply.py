@@ -7,7 +7,7 @@ from typing import Any
 from sightray._jit import implements
 from sightray.mathlib.table import Table, table_at
 from sightray.mathlib.vec import Vec3
-from sightray.textures.base import Texture, Where, texture_spectrum, texture_value, textured
+from sightray.textures.base import Texture, Where, mean_brightness, texture_spectrum, texture_value, textured
 
 
 class Multiply(Texture):
@@ -15,6 +15,9 @@ class Multiply(Texture):
 
     a: Any = textured("one factor")
     b: Any = textured("the other", default=1.0)
+
+    def brightness(self) -> float:
+        return mean_brightness([self.a]) * mean_brightness([self.b])
 
 
 A, B = Multiply.offsets()

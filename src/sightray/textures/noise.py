@@ -7,7 +7,7 @@ from sightray.fields import choice, flag, integer, number
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at
 from sightray.mathlib.vec import Vec3
-from sightray.textures.base import Where
+from sightray.textures.base import Where, reach
 from sightray.textures.blend import _Blend, share
 from sightray.textures.perlin import octaves_of
 
@@ -22,7 +22,7 @@ class Noise(_Blend):
     strength, is n, about -1 to 1, `light` has the share (1 + contrast n)/2, cut off at 0 and 1. With `turbulence` it is
     the mean of absolute values, and the share is ``contrast n``: creases, as in smoke and fire.
 
-    Octaves finer than a pixel fade away in ``"uv"``; solid noise of a distant surface wants samples instead.
+    Octaves finer than the footprint of a ray fade away to their mean.
 
     References: K. Perlin, "An image synthesizer", SIGGRAPH 1985; "Improving noise", SIGGRAPH 2002.
     """
@@ -42,7 +42,7 @@ MODE, SCALE, OCTAVES, GAIN, TURBULENCE, CONTRAST, SEED = Noise.offsets()[2:]
 @implements(share, Noise)
 def share_of_noise(texture: Table, where: Where) -> f64:
     scale = f64_at(texture, SCALE)
-    p, width = where.p * scale, 0.0
+    p, width = where.p * scale, reach(where) * scale
     if i64_at(texture, MODE) == UV:
         p, width = Vec3(where.u, where.v, 0.0) * scale, where.width * scale
     folded = i64_at(texture, TURBULENCE) != 0

@@ -57,6 +57,12 @@ def noise(p: Vec3, seed: i64) -> f64:
 
 
 @kernel
+def visible_at(width: f64) -> f64:
+    """How much is left of a pattern under a footprint of some width, in cells: all of one half, nothing of one."""
+    return min(max(2.0 - 2.0 * width, 0.0), 1.0)
+
+
+@kernel
 def octaves_of(p: Vec3, seed: i64, octaves: i64, gain: f64, width: f64, folded: bool) -> f64:
     """Noise, with each octave twice as fine and `gain` times as strong: fractal Brownian motion, -1 to 1.
 
@@ -65,8 +71,8 @@ def octaves_of(p: Vec3, seed: i64, octaves: i64, gain: f64, width: f64, folded: 
     """
     total, weight, strength = 0.0, 0.0, 1.0
     for octave in range(octaves):
-        n = noise(p, seed + octave * NEXT)
-        visible = min(max(2.0 - 2.0 * width, 0.0), 1.0)  # all of it with two samples in a cell, none with one
+        visible = visible_at(width)
+        n = noise(p, seed + octave * NEXT) if visible > 0.0 else 0.0
         if folded:
             n = abs(n) * visible + FOLDED_MEAN * (1.0 - visible)
         else:

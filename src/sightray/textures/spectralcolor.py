@@ -7,14 +7,21 @@ from typing import Any
 import numpy as np
 
 from sightray._jit import implements, kernel
-from sightray.errors import SceneError
-from sightray.fields import array, derived_array, derived_integer, derived_vector
+from sightray.errors import SceneError, unknown
+from sightray.fields import array, derived_array, derived_integer, derived_vector, other
 from sightray.mathlib.bands import WAVELENGTHS
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3
-from sightray.spectra import Spectrum
+from sightray.spectra import Spectrum, colorchecker
 from sightray.textures.base import Texture, Where, texture_spectrum, texture_value
+
+
+def _field(value: Any) -> str | None:
+    """The name of one of the chart's fields, or None."""
+    if value is not None and value not in colorchecker():
+        raise SceneError(unknown("field of the ColorChecker", str(value), colorchecker()))
+    return value
 
 
 class SpectralColor(Texture):
@@ -22,13 +29,15 @@ class SpectralColor(Texture):
 
     In spectral mode each path sees it at its own wavelengths. In RGB mode it is the colour that it has under daylight
     (D65), with what lies outside of Rec. 709 cut off: two spectra of one colour, which part under another light
-    (metamers), do so in spectral mode only.
+    (metamers), do so in spectral mode only. It is stated as a table, or as the name of a field of the ColorChecker
+    chart (see `spectra.colorchecker`).
     """
 
-    wavelengths: np.ndarray = array("ascending", np.float64, unit="nm")
-    reflectances: np.ndarray = array("at each, 0 to 1", np.float64)
+    wavelengths: np.ndarray = array("ascending", np.float64, default=None, unit="nm")
+    reflectances: np.ndarray = array("at each, 0 to 1", np.float64, default=None)
+    colorchecker: str | None = other("instead of both: name of a field of the ColorChecker", _field, default=None)
     _samples: Any = derived_array("wavelengths and values in turn", lambda s: s.pairs())
-    _count: Any = derived_integer("number of wavelengths", lambda s: len(s.wavelengths))
+    _count: Any = derived_integer("number of wavelengths", lambda s: len(s.pairs()))
     _rgb: Any = derived_vector("colour under D65", lambda s: s.rgb())
 
     @classmethod
@@ -39,9 +48,21 @@ class SpectralColor(Texture):
     @property
     def spectrum(self) -> Spectrum:
         """The reflectance."""
+        if self.colorchecker is not None:
+            return colorchecker()[self.colorchecker]
         return Spectrum(self.wavelengths, self.reflectances)
 
     def check(self) -> None:
+        stated = [name for name in ("wavelengths", "reflectances") if getattr(self, name) is not None]
+        if self.colorchecker is not None:
+            if stated:
+                raise SceneError(f"SpectralColor.colorchecker: stated beside {stated[0]}; allowed: one of the two")
+            return
+        if len(stated) != 2:
+            missing = "reflectances" if stated == ["wavelengths"] else "wavelengths"
+            raise SceneError(
+                f"SpectralColor.{missing}: missing; allowed: wavelengths and reflectances, or colorchecker"
+            )
         _ = self.spectrum  # complains about lengths and order
         if (self.reflectances < 0).any() or (self.reflectances > 1).any():
             raise SceneError("SpectralColor.reflectances: got numbers outside of 0 to 1; allowed: reflectances, 0 to 1")
@@ -50,9 +71,13 @@ class SpectralColor(Texture):
         """(3,) float64: linear Rec. 709 under D65, at least 0."""
         return np.maximum(self.spectrum.rgb("D65"), 0.0)
 
+    def brightness(self) -> float:
+        return float(self.rgb().mean())
+
     def pairs(self) -> np.ndarray:
         """(n, 2) float64: wavelength and value."""
-        return np.ascontiguousarray(np.column_stack([self.wavelengths, self.reflectances]))
+        spectrum = self.spectrum
+        return np.ascontiguousarray(np.column_stack([spectrum.wavelengths, spectrum.values]))
 
 
 _, _, SAMPLES, COUNT, RGB = SpectralColor.offsets()

@@ -10,7 +10,7 @@ from sightray.fields import number
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, is_null, table_at
 from sightray.mathlib.vec import Vec3, vabs
-from sightray.textures.base import Texture, Where, texture_spectrum, texture_value, textured
+from sightray.textures.base import Texture, Where, reach, texture_spectrum, texture_value, textured
 
 
 class Triplanar(Texture):
@@ -44,8 +44,9 @@ def weights(texture: Table, n: Vec3) -> Vec3:
 
 @kernel
 def projected(where: Where, u: f64, v: f64, facing: f64, scale: f64) -> Where:
-    """A place on one projection, seen from the side that the surface faces; its footprint in metres is not known."""
-    return Where(math.copysign(scale, facing) * u, scale * v, where.p, where.normal, 0.0, where.bands)
+    """A place on one projection, seen from the side that the surface faces, with its footprint there at most."""
+    u, v = math.copysign(scale, facing) * u, scale * v
+    return Where(u, v, where.p, where.normal, scale * reach(where), where.bands)
 
 
 @kernel

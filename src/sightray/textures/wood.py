@@ -13,11 +13,13 @@ from sightray.mathlib.axes import axes_across
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot
-from sightray.textures.base import Where, textured
+from sightray.textures.base import Where, reach, textured
 from sightray.textures.blend import _Blend, share
-from sightray.textures.perlin import FARTHEST, fade, noise, octaves_of
+from sightray.textures.perlin import FARTHEST, fade, noise, octaves_of, visible_at
 
 LATE = 0.82  # where in a ring the growth of a year slows down and the wood turns dark
+MEAN_DARK = 181.0 / 462.0  # mean of fade squared, that is of how dark a ring is
+FIBRES = 12.0  # cells of their noise in a ring
 ALONG_FIBRES = 1.0 / 24.0  # fibres are longer than thick by its inverse
 
 
@@ -25,7 +27,8 @@ class Wood(_Blend):
     """Annual rings about the line through `center` along `axis`: `light` early wood that darkens, then begins anew.
 
     Rings have `scale` per metre, waver by `waviness` rings, and show fibres along the axis of strength `grain`.
-    `center` and `axis` are in the space of the shape.
+    `center` and `axis` are in the space of the shape. Fibres, then rings, that are finer than the footprint of a ray
+    fade away to their mean.
 
     References: D. Peachey, "Solid texturing of complex surfaces", SIGGRAPH 1985, section 4.
     """
@@ -56,8 +59,13 @@ def share_of_wood(texture: Table, where: Where) -> f64:
 
     # Rings waver slowly around the trunk and more slowly along it.
     seed = i64_at(texture, SEED)
-    r += f64_at(texture, WAVINESS) * octaves_of(Vec3(0.4 * x, 0.4 * y, 0.1 * z), seed, 3, 0.5, 0.0, False)
+    width = reach(where) * f64_at(texture, SCALE)
+    r += f64_at(texture, WAVINESS) * octaves_of(Vec3(0.4 * x, 0.4 * y, 0.1 * z), seed, 3, 0.5, 0.4 * width, False)
     ring = r - np.floor(r)
     late = fade(ring / LATE) if ring < LATE else fade((1.0 - ring) / (1.0 - LATE))
-    fibres = 0.5 + 0.5 * noise(Vec3(12.0 * x, 12.0 * y, 12.0 * ALONG_FIBRES * z), seed + 1000)
-    return (1.0 - late * late) * (1.0 - f64_at(texture, GRAIN) * fibres)
+    visible = visible_at(width)
+    dark = late * late * visible + MEAN_DARK * (1.0 - visible)
+    fibres, visible = 0.5, visible_at(FIBRES * width)
+    if visible > 0.0:
+        fibres += 0.5 * visible * noise(Vec3(FIBRES * x, FIBRES * y, FIBRES * ALONG_FIBRES * z), seed + 1000)
+    return (1.0 - dark) * (1.0 - f64_at(texture, GRAIN) * fibres)

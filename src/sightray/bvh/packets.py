@@ -83,8 +83,6 @@ from sightray.mathlib.table import Table, advance, f64_at, i64_at, i64_put, scra
 # and of a group.
 SPREAD, GROUP_SPREAD = 0.02, 0.08
 
-EXACT, FAST, ANY = 0, 1, 2  # what is asked
-
 # Words of the room: lanes, working memory and extremes of packets; then groups and, when these are done, bundles.
 PACKETS = 16
 LANES = 0
@@ -269,9 +267,11 @@ def meet_block_any(mesh: Table, packets: Table, t_min: f64, block: i64, group: T
 
 
 @kernel
-def trace_rays(mesh: Table, packets: Table, count: i64, t_min: f64, what: i64, found: Table, room: Table) -> None:
-    """`closest_rays`, `fast_rays` or `any_rays`: packets that go the same way in groups, the others ray by ray."""
-    groups, apart, alive = 0, scratch(16), scratch(16)
+def form_groups(
+    mesh: Table, packets: Table, count: i64, t_min: f64, apart: Table, found: Table, room: Table
+) -> i64:  # fmt: skip
+    """Put packets that go the same way into groups, whose number this is; the rays of the others go to `apart`."""
+    groups, alive = 0, scratch(16)
     for first in range(0, count, 4):
         coherent, axes, octants = 0, 0, 0
         for number in range(first, min(first + 4, count)):
@@ -295,43 +295,32 @@ def trace_rays(mesh: Table, packets: Table, count: i64, t_min: f64, what: i64, f
             i64_put(group, FIRST, first)
             i64_put(group, AXES, axes)
             coherent &= ~gather_group(group, coherent, advance(alive, first), octants, room)
-    if what == FAST:
-        tighten(advance(room, LANES), count)
-    if groups > 0:
-        if what == ANY:
-            any_together(mesh, packets, t_min, groups, room)
-        else:
-            closest_together(mesh, packets, t_min, groups, what == FAST, room)
-        for g in range(groups):
-            group = group_at(room, g)
-            for p in range(4):
-                if i64_at(group, MET + p) != 0:
-                    i64_put(found, i64_at(group, FIRST) + p, i64_at(group, MET + p))
-    for first in range(0, count, 4):
-        trace_apart(mesh, packets, first, min(first + 4, count), t_min, what, apart, found, room)
-    if what == FAST:
-        end_fast(packets, advance(room, WORKS), advance(room, LANES), found, count)
+    return groups
 
 
 @kernel
-def trace_apart(
-    mesh: Table, packets: Table, first: i64, last: i64, t_min: f64, what: i64, apart: Table, found: Table, room: Table
-) -> None:
-    """The rays `apart` of up to four packets, each on its own."""
+def note_groups(groups: i64, found: Table, room: Table) -> None:
+    """Write down who met something in groups."""
+    for g in range(groups):
+        group = group_at(room, g)
+        for p in range(4):
+            if i64_at(group, MET + p) != 0:
+                i64_put(found, i64_at(group, FIRST) + p, i64_at(group, MET + p))
+
+
+@kernel
+def rays_apart(apart: Table, first: i64, count: i64) -> i64:
+    """The rays of four packets that go each on its own, a bit each."""
     bits = 0
-    for number in range(first, last):
+    for number in range(first, min(first + 4, count)):
         bits |= i64_at(apart, number) << (16 * (number - first))
-    if bits == 0:
-        return
-    packet, works = advance(packets, first * PACKET_WORDS), advance(room, WORKS + first * WORK_WORDS)
-    lanes, rest = advance(room, LANES + first * LANE_WORDS), advance(room, GROUPS)
-    if what == ANY:
-        bits = any_in_turns(mesh, packet, t_min, bits, works, lanes, rest)
-    elif what == FAST:
-        bits = fast_in_turns(mesh, packet, t_min, bits, works, lanes, rest)
-    else:
-        bits = closest_in_turns(mesh, packet, t_min, bits, works, lanes, rest)
-    for number in range(first, last):
+    return bits
+
+
+@kernel
+def note_apart(found: Table, first: i64, count: i64, bits: i64) -> None:
+    """Write down who of these met something."""
+    for number in range(first, min(first + 4, count)):
         its = (bits >> (16 * (number - first))) & 0xFFFF
         i64_put(found, number, i64_at(found, number) | its)
 
@@ -374,16 +363,48 @@ def closest_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Tab
     Their bits are written to `found`, a word for each packet. Their hits are what `closest_triangle` finds; of equal t the
     triangle that comes first.
     """
-    trace_rays(mesh, packets, count, t_min, EXACT, found, room)
+    apart = scratch(16)
+    groups = form_groups(mesh, packets, count, t_min, apart, found, room)
+    if groups > 0:
+        closest_together(mesh, packets, t_min, groups, False, room)
+        note_groups(groups, found, room)
+    for first in range(0, count, 4):
+        bits = rays_apart(apart, first, count)
+        if bits != 0:
+            works, lanes = advance(room, WORKS + first * WORK_WORDS), advance(room, LANES + first * LANE_WORDS)
+            packet, rest = advance(packets, first * PACKET_WORDS), advance(room, GROUPS)
+            note_apart(found, first, count, closest_in_turns(mesh, packet, t_min, bits, works, lanes, rest))
 
 
 @kernel
 def fast_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
     """`closest_rays`, decided in single precision (see `fast`)."""
-    trace_rays(mesh, packets, count, t_min, FAST, found, room)
+    apart = scratch(16)
+    groups = form_groups(mesh, packets, count, t_min, apart, found, room)
+    tighten(advance(room, LANES), count)
+    if groups > 0:
+        closest_together(mesh, packets, t_min, groups, True, room)
+        note_groups(groups, found, room)
+    for first in range(0, count, 4):
+        bits = rays_apart(apart, first, count)
+        if bits != 0:
+            works, lanes = advance(room, WORKS + first * WORK_WORDS), advance(room, LANES + first * LANE_WORDS)
+            packet, rest = advance(packets, first * PACKET_WORDS), advance(room, GROUPS)
+            note_apart(found, first, count, fast_in_turns(mesh, packet, t_min, bits, works, lanes, rest))
+    end_fast(packets, advance(room, WORKS), advance(room, LANES), found, count)
 
 
 @kernel
 def any_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
     """The rays of up to sixteen packets that meet the mesh between t_min and their end: bits as for `closest_rays`."""
-    trace_rays(mesh, packets, count, t_min, ANY, found, room)
+    apart = scratch(16)
+    groups = form_groups(mesh, packets, count, t_min, apart, found, room)
+    if groups > 0:
+        any_together(mesh, packets, t_min, groups, room)
+        note_groups(groups, found, room)
+    for first in range(0, count, 4):
+        bits = rays_apart(apart, first, count)
+        if bits != 0:
+            works, lanes = advance(room, WORKS + first * WORK_WORDS), advance(room, LANES + first * LANE_WORDS)
+            packet, rest = advance(packets, first * PACKET_WORDS), advance(room, GROUPS)
+            note_apart(found, first, count, any_in_turns(mesh, packet, t_min, bits, works, lanes, rest))

@@ -21,7 +21,7 @@ from sightray.accelerators.item import (
 from sightray.bvh.bundles import packet_vec3
 from sightray.bvh.bvh8 import int_at
 from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
-from sightray.bvh.packets import EXACT, FAST, PACKETS, ROOM_WORDS, any_rays, closest_rays, fast_rays
+from sightray.bvh.packets import PACKETS, ROOM_WORDS, any_rays, closest_rays, fast_rays
 from sightray.mathlib.lanes import (
     load16d,
     mask16,
@@ -111,105 +111,155 @@ def move_packets(item: Table, packets: Table, count: i64, moved: Table) -> None:
 
 
 @kernel
-def closest_of_mesh(
-    mesh: Table, precision: i64, packets: Table, count: i64, t_min: f64, found: Table, room: Table
-) -> None:
-    """`closest_rays`, or `fast_rays` if these will do."""
-    if precision == FAST:
-        fast_rays(mesh, packets, count, t_min, found, room)
-    else:
-        closest_rays(mesh, packets, count, t_min, found, room)
+def bring_back(packets: Table, moved: Table, count: i64, found: Table) -> None:
+    """Take over the nearer ends that packets have found in an item's object space."""
+    for p in range(count):
+        packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
+        better = mask16(i64_at(found, p))
+        store16d(packet, END, select16d(better, load16d(there, END), load16d(packet, END)))
+        store16d(packet, PRIM, select16d(better, load16d(there, PRIM), load16d(packet, PRIM)))
+
+
+@kernel
+def closest_of_shape(item: Table, packets: Table, count: i64, t_min: f64, found: Table) -> None:
+    """The rays of packets that meet what is no mesh before their end, which is brought there; one after the other."""
+    for p in range(count):
+        i64_put(found, p, 0)
+        packet = advance(packets, p * PACKET_WORDS)
+        for lane in range(16):
+            o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
+            t_max = f64_at(packet, END + lane)
+            if t_min < t_max and is_ray(o, d):
+                hit = intersect_item(item, o, d, t_min, t_max)
+                if hit.t < t_max:
+                    f64_put(packet, END + lane, hit.t)
+                    f64_put(packet, PRIM + lane, float(hit.prim))
+                    i64_put(found, p, i64_at(found, p) | 1 << lane)
 
 
 @kernel
 def closest_of_packets(
-    item: Table, is_mesh: bool, precision: i64, packets: Table, count: i64, moved: Table, t_min: f64, found: Table,
-    room: Table,
-) -> None:  # fmt: skip
+    item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64, found: Table, room: Table
+) -> None:
     """The rays of packets that meet an item before their end, which is brought there."""
-    if is_mesh and i64_at(item, MOVED) == 0:
-        closest_of_mesh(table_at(item, SHAPE), precision, packets, count, t_min, found, room)
-    elif is_mesh:
-        move_packets(item, packets, count, moved)
-        closest_of_mesh(table_at(item, SHAPE), precision, moved, count, t_min, found, room)
-        for p in range(count):
-            packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
-            better = mask16(i64_at(found, p))
-            store16d(packet, END, select16d(better, load16d(there, END), load16d(packet, END)))
-            store16d(packet, PRIM, select16d(better, load16d(there, PRIM), load16d(packet, PRIM)))
+    if not is_mesh:
+        closest_of_shape(item, packets, count, t_min, found)
+    elif i64_at(item, MOVED) == 0:
+        closest_rays(table_at(item, SHAPE), packets, count, t_min, found, room)
     else:
-        for p in range(count):
-            i64_put(found, p, 0)
-            packet = advance(packets, p * PACKET_WORDS)
-            for lane in range(16):
-                o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
-                t_max = f64_at(packet, END + lane)
-                if t_min < t_max and is_ray(o, d):
-                    hit = intersect_item(item, o, d, t_min, t_max)
-                    if hit.t < t_max:
-                        f64_put(packet, END + lane, hit.t)
-                        f64_put(packet, PRIM + lane, float(hit.prim))
-                        i64_put(found, p, i64_at(found, p) | 1 << lane)
+        move_packets(item, packets, count, moved)
+        closest_rays(table_at(item, SHAPE), moved, count, t_min, found, room)
+        bring_back(packets, moved, count, found)
+
+
+@kernel
+def fast_of_packets(
+    item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64, found: Table, room: Table
+) -> None:
+    """`closest_of_packets`, decided in single precision where it is a mesh."""
+    if not is_mesh:
+        closest_of_shape(item, packets, count, t_min, found)
+    elif i64_at(item, MOVED) == 0:
+        fast_rays(table_at(item, SHAPE), packets, count, t_min, found, room)
+    else:
+        move_packets(item, packets, count, moved)
+        fast_rays(table_at(item, SHAPE), moved, count, t_min, found, room)
+        bring_back(packets, moved, count, found)
 
 
 @kernel
 def closest_of_item(item: Table, is_mesh: bool, packets: Table, count: i64, moved: Table, t_min: f64) -> i64:
     """`closest_of_packets` for up to four packets, with working memory of its own; the bits of the rays."""
     found, room, bits = scratch(16), scratch(ROOM_WORDS), 0
-    closest_of_packets(item, is_mesh, EXACT, packets, count, moved, t_min, found, room)
+    closest_of_packets(item, is_mesh, packets, count, moved, t_min, found, room)
     for p in range(count):
         bits |= i64_at(found, p) << (16 * p)
     return bits
 
 
 @kernel
+def reset_answers(packets: Table, count: i64, found: Table, item: Table, thing: Table) -> None:
+    """No ray has met anything yet."""
+    none = splat16d(-1.0)
+    for p in range(count):
+        i64_put(found, p, 0)
+        store16d(packets, p * PACKET_WORDS + PRIM, none)
+        store16d(item, 16 * p, none)
+        store16d(thing, 16 * p, none)
+
+
+@kernel
+def note_item(index: i64, row: Table, count: i64, met: Table, found: Table, item: Table, thing: Table) -> None:
+    """Note of which item and object the hits are that were found last."""
+    for p in range(count):
+        these = mask16(i64_at(met, p))
+        i64_put(found, p, i64_at(found, p) | i64_at(met, p))
+        store16d(item, 16 * p, select16d(these, splat16d(float(index)), load16d(item, 16 * p)))
+        number = splat16d(float(i64_at(row, OBJECT)))
+        store16d(thing, 16 * p, select16d(these, number, load16d(thing, 16 * p)))
+
+
+@kernel
+def put_answers(
+    first: i64, n: i64, packets: Table, count: i64, found: Table, item: Table, thing: Table, t: Table, items: Table,
+    objects: Table, primitives: Table,
+) -> None:  # fmt: skip
+    """Write the answers of the packets from ray number `first` on: sixteen at a time, and the rest one by one."""
+    for p in range(count):
+        start, packet = first + 16 * p, advance(packets, p * PACKET_WORDS)
+        met16 = mask16(i64_at(found, p))
+        store16d(packet, END, select16d(met16, load16d(packet, END), splat16d(math.inf)))
+        if start + 16 <= n:
+            store16d(t, start, load16d(packet, END))
+            put_ints16(items, start, load16d(item, 16 * p))
+            put_ints16(objects, start, load16d(thing, 16 * p))
+            put_ints16(primitives, start, load16d(packet, PRIM))
+        else:
+            for lane in range(n - start):
+                f64_put(t, start + lane, f64_at(packet, END + lane))
+                i32_put(items, start + lane, int(f64_at(item, 16 * p + lane)))
+                i32_put(objects, start + lane, int(f64_at(thing, 16 * p + lane)))
+                i32_put(primitives, start + lane, int(f64_at(packet, PRIM + lane)))
+
+
+@kernel
 def closest_of_few(
-    world: Table, kinds: Table, n_items: i64, precision: i64, origins: Table, o_form: i64, directions: Table, d_form: i64,
-    ends: Table, e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table,
-    room: Table,
+    world: Table, kinds: Table, n_items: i64, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table,
+    e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table, room: Table,
 ) -> None:  # fmt: skip
     """The nearest hit of each ray: float64 t, and int32 item, object and primitive, -1 where there is none."""
     packets, moved, item, thing = scratch(2048), scratch(2048), scratch(256), scratch(256)
-    met, found = scratch(16), scratch(16)
-    rows, none = table_at(world, ITEMS), splat16d(-1.0)
+    met, found, rows = scratch(16), scratch(16), table_at(world, ITEMS)
     for first in range(0, n, RAYS):
         if first & LOOK == 0 and i64_at(stop, 0) != 0:
             return
         count = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets)
-        for p in range(count):
-            store16d(packets, p * PACKET_WORDS + PRIM, none)
-            store16d(item, 16 * p, none)
-            store16d(thing, 16 * p, none)
-
-        # Each item brings the ends nearer of the rays that meet it.
-        for p in range(count):
-            i64_put(found, p, 0)
-        for index in range(n_items):
+        reset_answers(packets, count, found, item, thing)
+        for index in range(n_items):  # each item brings the ends nearer of the rays that meet it
             row = item_at(rows, index)
-            closest_of_packets(row, int_at(kinds, index) == MESH, precision, packets, count, moved, t_min, met, room)
-            for p in range(count):
-                i64_put(found, p, i64_at(found, p) | i64_at(met, p))
-                these = mask16(i64_at(met, p))
-                store16d(item, 16 * p, select16d(these, splat16d(float(index)), load16d(item, 16 * p)))
-                number = splat16d(float(i64_at(row, OBJECT)))
-                store16d(thing, 16 * p, select16d(these, number, load16d(thing, 16 * p)))
+            closest_of_packets(row, int_at(kinds, index) == MESH, packets, count, moved, t_min, met, room)
+            note_item(index, row, count, met, found, item, thing)
+        put_answers(first, n, packets, count, found, item, thing, t, items, objects, primitives)
 
-        # Write the answers: sixteen at a time, and the rest one by one.
-        for p in range(count):
-            start, packet = first + 16 * p, advance(packets, p * PACKET_WORDS)
-            met16 = mask16(i64_at(found, p))
-            store16d(packet, END, select16d(met16, load16d(packet, END), splat16d(math.inf)))
-            if start + 16 <= n:
-                store16d(t, start, load16d(packet, END))
-                put_ints16(items, start, load16d(item, 16 * p))
-                put_ints16(objects, start, load16d(thing, 16 * p))
-                put_ints16(primitives, start, load16d(packet, PRIM))
-            else:
-                for lane in range(n - start):
-                    f64_put(t, start + lane, f64_at(packet, END + lane))
-                    i32_put(items, start + lane, int(f64_at(item, 16 * p + lane)))
-                    i32_put(objects, start + lane, int(f64_at(thing, 16 * p + lane)))
-                    i32_put(primitives, start + lane, int(f64_at(packet, PRIM + lane)))
+
+@kernel
+def fast_of_few(
+    world: Table, kinds: Table, n_items: i64, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table,
+    e_form: i64, t_min: f64, n: i64, t: Table, items: Table, objects: Table, primitives: Table, stop: Table, room: Table,
+) -> None:  # fmt: skip
+    """`closest_of_few` in single precision; a kernel of its own, so that nobody compiles it who does not ask for it."""
+    packets, moved, item, thing = scratch(2048), scratch(2048), scratch(256), scratch(256)
+    met, found, rows = scratch(16), scratch(16), table_at(world, ITEMS)
+    for first in range(0, n, RAYS):
+        if first & LOOK == 0 and i64_at(stop, 0) != 0:
+            return
+        count = fill_packets(origins, o_form, directions, d_form, ends, e_form, first, n, packets)
+        reset_answers(packets, count, found, item, thing)
+        for index in range(n_items):  # each item brings the ends nearer of the rays that meet it
+            row = item_at(rows, index)
+            fast_of_packets(row, int_at(kinds, index) == MESH, packets, count, moved, t_min, met, room)
+            note_item(index, row, count, met, found, item, thing)
+        put_answers(first, n, packets, count, found, item, thing, t, items, objects, primitives)
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 from sightray._jit import native
 from sightray.accelerators.bvh import pack_items
 from sightray.accelerators.item import CUTOUT
-from sightray.bvh.packets import EXACT, FAST, ROOM_WORDS
+from sightray.bvh.packets import ROOM_WORDS
 from sightray.errors import SceneError
 from sightray.mathlib.table import Table, aligned, table_at
 from sightray.scene.columns import Column, Output, common_shape, numbers
@@ -21,7 +21,7 @@ from sightray.scene.compile import Compiled, compile_scene, world_bounds
 from sightray.scene.crossings import LAYER_WORDS, MESH, OTHER
 from sightray.scene.hits import Details, Hits, Layers
 from sightray.scene.layer_kernels import count_of_rays, layers_of_rays, sieve_layers
-from sightray.scene.packet_kernels import FEW_ITEMS, any_of_few, closest_of_few
+from sightray.scene.packet_kernels import FEW_ITEMS, any_of_few, closest_of_few, fast_of_few
 from sightray.scene.parallel import run_chunks
 from sightray.scene.query_kernels import any_of_rays, closest_of_rays, describe_hits
 from sightray.scene.world import FLAGS, ITEMS
@@ -56,7 +56,7 @@ class Asked:
     def closest(self, precision: str) -> Callable:
         """The kernel for the nearest hit, with its scene: by packets where a mesh is among few items."""
         if self.packets:
-            return self.with_room(closest_of_few, FAST if precision == "fast" else EXACT)
+            return self.with_room(fast_of_few if precision == "fast" else closest_of_few)
         return partial(self.kernel(closest_of_rays), self.world)
 
     def any(self) -> Callable:
@@ -65,9 +65,9 @@ class Asked:
             return self.with_room(any_of_few)
         return partial(self.kernel(any_of_rays), self.world)
 
-    def with_room(self, function: Callable, *options: int) -> Callable:
-        """A kernel of packets, with its scene and options, and with working memory for each thread."""
-        run = partial(self.kernel(function), self.world, self.kinds, len(self.objects), *options)
+    def with_room(self, function: Callable) -> Callable:
+        """A kernel of packets, with its scene, and with working memory for each thread."""
+        run = partial(self.kernel(function), self.world, self.kinds, len(self.objects))
         return lambda *arguments: run(*arguments, room())
 
     def tree(self) -> Table:

@@ -127,6 +127,17 @@ def test_roulette_and_clamp():
     assert clamped.mean() < plain[0] * 0.9
 
 
+def test_clamp_counts_turns_in_media():
+    """Fog alone: with a clamp of nearly nothing, light that was scattered more than once is gone."""
+    fog = sr.HomogeneousMedium(scattering=0.5, absorption=0.2)
+    camera = sr.PerspectiveCamera(eye=(0, 0, 3), target=(0, 0, 0), vfov=60, width=16, height=16)
+    scene = sr.Scene(sr.Sphere(center=(0, 0, 50)), sr.PointLight(position=(0, 2, 0), intensity=5), camera=camera,
+                     medium=fog, ambient=0)  # fmt: skip
+    free, once = (np.asarray(sr.render(scene, sr.PathTracer(clamp=c), samples=64), float) for c in (None, 1e-9))
+    assert once.mean() < 0.8 * free.mean()
+    assert (once > 0).all()
+
+
 @kernel
 def turn_about(numbers: Table, out: Table) -> f64:
     frame = frame_about(vec3_at(numbers, 0))

@@ -57,7 +57,7 @@ class PathTracer(Integrator):
         "shadow rays from the first surface of a path; more where the noise is that of direct light", default=1,
         at_least=1, at_most=1024)  # fmt: skip
     clamp: float | None = real(
-        "most that one walk may add after its first bounce, against fireflies; None for no bias", default=None, above=0,
+        "most that a walk may add at once after its first turn, against fireflies; None for no bias", default=None, above=0,
         optional=True)  # fmt: skip
     spectral: bool = flag("follow wavelengths instead of red, green and blue", default=False)
     _bands: Any = derived_array("table of spectra, if spectral", lambda p: band_table() if p.spectral else None)
@@ -93,7 +93,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
     # Where the direction d was chosen, the normal there, and with which density; 0 for rays of sight and mirrors.
     start, n, density, gone = o, grey(0.0), 0.0, 0.0
     t_min = 0.0
-    rays = depth = event = 0
+    rays = depth = turns = event = 0  # depth: bounces; turns: those and scatterings
     while event < MOST_EVENTS:
         rays += 1
         hit = find_closest(world, o, d, t_min, math.inf)
@@ -111,7 +111,8 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
                 if light_count(world) > 0:
                     direct = direct_light_within(world, o, d, nest, bands, own)
                     rays += direct.rays
-                    color += limited(integrator, beta * direct.color, depth + 1)
+                    color += limited(integrator, beta * direct.color, turns + 1)
+                turns += 1
                 way, choice = pair(own, WAY), pair(own, CHOICE)
                 turned = sample_phase(nest.here, d, way.u, way.v)
                 d, start, n, density, gone, t_min = turned.direction, o, grey(0.0), turned.density, 0.0, 0.0
@@ -124,7 +125,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         # Take the light that the nearest surface gives off, unless looking for lights has taken it already.
         if hit.item < 0:
             behind = light_of_skies(world, start, n, d, density, bands)
-            color += limited(integrator, beta * behind, depth)
+            color += limited(integrator, beta * behind, turns)
             break
         point = on_seen_side(point_of(world, hit, o, d, beam), d)
         t_min = first_step(math.nan, point.p, hit.t)
@@ -138,7 +139,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         own_light = glow_in(bands, point.material, emitted(point.material, point.where, point.cos_view))
         if max4(own_light) > 0.0:
             weight = chance_weight(world, point.light, start, n, d, gone, density)
-            color += limited(integrator, beta * own_light * weight, depth)
+            color += limited(integrator, beta * own_light * weight, turns)
         if depth >= i64_at(integrator, DEPTH):
             break
 
@@ -153,7 +154,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
             for k in range(count):
                 direct = direct_light(world, point, lit_from, frame, wo, t_min, nest, bands, one_of(own, k, count))
                 rays += direct.rays
-                color += limited(integrator, beta * direct.color, depth + 1) * (1.0 / count)
+                color += limited(integrator, beta * direct.color, turns + 1) * (1.0 / count)
 
         # Go on in a direction that the material chooses, or end the walk if it has become unimportant.
         beta = beta * chosen.weight
@@ -168,6 +169,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         beam = onward(beam, hit.t, chosen.density)
         o, start, n, density, gone = point.p, point.p, lit_normal(point), chosen.density, 0.0
         depth += 1
+        turns += 1
     return Radiance(color, rays)
 
 
@@ -198,10 +200,10 @@ def onward(beam: Beam, t: f64, density: f64) -> Beam:
 
 
 @kernel
-def limited(integrator: Table, color: Vec3, depth: i64) -> Vec3:
+def limited(integrator: Table, color: Vec3, turns: i64) -> Vec3:
     """A contribution, scaled down to the clamp if one is set; what is seen directly is never touched."""
     most = f64_at(integrator, CLAMP)
     brightest = max4(color)
-    if most == most and depth > 1 and brightest > most:
+    if most == most and turns > 1 and brightest > most:
         return color * (most / brightest)
     return color

@@ -150,6 +150,17 @@ def test_workers_and_threads_make_the_same_files(recipe, tmp_path):
     assert one == two
 
 
+def test_e11_labels_do_not_depend_on_the_samples_of_the_pictures(recipe, tmp_path):
+    """Pictures of one sample and of four differ; depths, masks and poses beside them are the same to the bit."""
+    few, many = (contents(make_dataset(recipe, tmp_path / str(n), formats=["bop"], frames=2, samples=n)) for n in (1, 4))
+    assert few.keys() == many.keys()
+    differ = {name for name in few if few[name] != many[name]}
+    labels = {name for name in few if "/depth/" in name or "/mask" in name or name.endswith(("_gt.json", "_camera.json"))}
+    assert len(labels) >= 6
+    assert not differ & labels
+    assert any("/rgb/" in name for name in differ)
+
+
 def test_more_frames_leave_the_first_ones_alone(recipe, tmp_path):
     root = make_dataset(recipe, tmp_path / "grown", formats=FORMATS, frames=2)
     times = {p: p.stat().st_mtime_ns for p in root.rglob("exr/*.exr")}

@@ -17,6 +17,7 @@ _HOMES = {
     "Orbit": "trajectory",
     "Recipe": "recipe",
     "Rig": "rigs",
+    "Sensor": "sensor",
     "Shaken": "trajectory",
     "Shot": "shot",
     "Still": "trajectory",

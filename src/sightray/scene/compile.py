@@ -148,8 +148,9 @@ class Compiled:
 
     def _pack_items(self, items: Table) -> tuple[np.ndarray, np.ndarray]:
         """Fill the items' rows; their bounds, each (n, 3). Items that were merged have none, what they became has."""
-        integers = items.view(np.int64)
+        integers, numbers = items.view(np.int64), items.view(np.float64)
         packed = list(self.items)
+        unmoved, flags = np.tile(np.eye(4).ravel(), 2), {}  # both matrices of what stays in its place
         if self.merged is not None:
             packed.append(Item(self.merged.mesh, DEFAULT_MATERIAL, IDENTITY, -1, ""))
         lower, upper = np.empty((2, len(packed), 3))
@@ -158,7 +159,8 @@ class Compiled:
             start = index * item_row.ITEM_WORDS
             integers[start + item_row.SHAPE] = self.tables.row_of(item.shape).address
             integers[start + item_row.MATERIAL] = self.tables.row_of(item.material).address
-            integers[start + item_row.MOVED] = item_row.PLACED if not item.transform.is_identity else item_row.UNMOVED
+            still = item.transform.is_identity
+            integers[start + item_row.MOVED] = item_row.UNMOVED if still else item_row.PLACED
             integers[start + item_row.MET] = integers[start + item_row.SHAPE]
             if item.placement is not None:
                 moving = _Moving(shape=item.shape, placement=item.placement)
@@ -166,9 +168,15 @@ class Compiled:
                 integers[start + item_row.MET] = self.tables.row_of(moving).address
             integers[start + item_row.OBJECT] = item.object
             integers[start + item_row.LIGHT] = lights.get(item.object, -1)
-            integers[start + item_row.FLAGS] = flags_of(item.material)
-            put_columns(items, start + item_row.OBJECT_FROM_WORLD, item.transform.inverse)
-            put_columns(items, start + item_row.WORLD_FROM_OBJECT, item.transform.matrix)
+            if id(item.material) not in flags:
+                flags[id(item.material)] = flags_of(item.material)
+            integers[start + item_row.FLAGS] = flags[id(item.material)]
+            if still:
+                first = start + item_row.OBJECT_FROM_WORLD
+                numbers[first : first + len(unmoved)] = unmoved
+            else:
+                put_columns(items, start + item_row.OBJECT_FROM_WORLD, item.transform.inverse)
+                put_columns(items, start + item_row.WORLD_FROM_OBJECT, item.transform.matrix)
             lower[index], upper[index] = world_bounds(item)
         if self.merged is not None:
             lower[self.merged.members], upper[self.merged.members] = np.inf, -np.inf

@@ -20,6 +20,7 @@ _HOMES = {
     "Sensor": "sensor",
     "Shaken": "trajectory",
     "Shot": "shot",
+    "StereoDepth": "stereo_depth",
     "Still": "trajectory",
     "Trajectory": "trajectory",
     "back_project": "back_projection",

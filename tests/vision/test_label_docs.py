@@ -79,7 +79,7 @@ def test_code_runs(tmp_path, monkeypatch, forget_slant):
     monkeypatch.setitem(sys.modules, "labels_page", module)
     scope = module.__dict__
     blocks = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-    assert len(blocks) == 3
+    assert len(blocks) == 5
     for number, block in enumerate(blocks):
         path = tmp_path / f"block{number}.py"
         path.write_text(block, encoding="utf-8")
@@ -88,3 +88,5 @@ def test_code_runs(tmp_path, monkeypatch, forget_slant):
     slant = np.asarray(scope["slant"])
     assert 0 <= np.nanmin(slant) < np.nanmax(slant) <= np.pi / 2
     assert scope["labels"].classes[:2] == ("room", "thing")
+    assert scope["raw"].shape == scope["depth"].shape == (512, 512)
+    assert scope["raw"].dtype == np.uint16

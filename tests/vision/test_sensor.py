@@ -33,6 +33,7 @@ def test_dark_current_and_full_wells():
     assert (dark.capture(grey(0.0, 4, 4)) == 1024).all()  # 1000 of 4000 electrons, 4095 numbers
     bright = sr.vision.Sensor(full_well=4000, read_noise=5.0, bits=12).capture(grey(1e9, 40, 40))
     assert bright.max() == 4095
+    assert 0.3 < (bright < 4095).mean() < 0.7  # wells fill up before noise is added, which then falls to either side
     assert (bright > 4095 * (1 - 6 * 5 / 4000)).all()
 
 
@@ -87,12 +88,19 @@ def test_pictures_are_taken_as_they_come():
 @pytest.mark.parametrize(("wrong", "said"), [
     ({"exposure": 0}, "Sensor.exposure: got 0; allowed: a finite number > 0"),
     ({"read_noise": -1}, "Sensor.read_noise"), ({"bits": 17}, "Sensor.bits"), ({"bits": True}, "Sensor.bits"),
+    ({"bits": float("nan")}, "Sensor.bits"),
     ({"bayer": "RGBG"}, "RGGB"), ({"response": "sRGB"}, "srgb"), ({"response": 0.0}, "Sensor.response"),
     ({"black": 1.0}, "Sensor.black"), ({"vignetting": 0.2}, "Sensor.vignetting"),
 ])  # fmt: skip
 def test_bad_settings_are_told(wrong, said):
     with pytest.raises(SceneError, match=said.replace("(", r"\(")):
         sr.vision.Sensor(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"seed": -1}, {"frame": 0.5}])
+def test_bad_seeds_are_told(wrong):
+    with pytest.raises(SceneError, match=r"Sensor: (seed|frame): got"):
+        sr.vision.Sensor().capture(grey(0.1, 2, 2), **wrong)
 
 
 @pytest.mark.parametrize("light", [np.zeros((4, 4)), np.full((2, 2, 3), np.nan)])

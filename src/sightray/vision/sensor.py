@@ -24,6 +24,14 @@ PATTERNS = {"RGGB": ((0, 1), (1, 2)), "BGGR": ((2, 1), (1, 0)), "GRBG": ((1, 0),
 RESPONSES = ("linear", "srgb")
 
 
+def noise_source(who: str, seed: Any, frame: Any) -> np.random.Generator:
+    """Random numbers that are a function of two whole numbers >= 0, or a `SceneError`."""
+    for name, value in (("seed", seed), ("frame", frame)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+            raise SceneError(f"{who}: {name}: got {value!r}; allowed: a whole number >= 0")
+    return np.random.default_rng([seed, frame])
+
+
 @dataclass(frozen=True)
 class Sensor:
     """What a camera makes of radiance: exposure, vignetting, colour filters, noise, response and quantisation.
@@ -69,7 +77,7 @@ class Sensor:
         for name in ("read_noise", "dark_current"):
             self._number(name, "a finite number >= 0", lambda x: 0 <= x < math.inf)
         self._number("black", "a number from 0 to less than 1", lambda x: 0 <= x < 1)
-        self._number("bits", "a whole number from 1 to 16", lambda x: x == int(x) and 1 <= x <= 16)
+        self._number("bits", "a whole number from 1 to 16", lambda x: x in range(1, 17))
         if self.bayer is not None and self.bayer not in PATTERNS:
             raise SceneError(f"Sensor.bayer: {unknown('pattern', str(self.bayer), PATTERNS)}")
         if isinstance(self.response, str) and self.response not in RESPONSES:
@@ -125,7 +133,7 @@ class Sensor:
             If `radiance` has another shape or is not finite.
         """
         mean = self.electrons(radiance)
-        random = np.random.default_rng([seed, frame])
+        random = noise_source("Sensor", seed, frame)
         charge = random.poisson(np.minimum(mean, 4.0 * self.full_well)) if self.shot_noise else mean
         charge = np.minimum(charge, self.full_well) + random.normal(0.0, 1.0, mean.shape) * self.read_noise
         share = np.clip(self.black + (1.0 - self.black) * charge / self.full_well, 0.0, 1.0)

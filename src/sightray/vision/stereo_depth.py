@@ -22,6 +22,7 @@ import numpy as np
 from sightray.errors import SceneError
 from sightray.vision.label import make_labels
 from sightray.vision.rigs import stereo_rig
+from sightray.vision.sensor import noise_source
 from sightray.vision.view import is_linear
 
 
@@ -86,7 +87,7 @@ class StereoDepth:
         exact = make_labels(scene, ("disparity", "occlusion", "out_of_view", "instance"), stereo=pair, next=pair)
 
         # What is matched, and how exactly.
-        random = np.random.default_rng([seed, frame])
+        random = noise_source("StereoDepth", seed, frame)
         measured = exact.disparity + self.noise * random.normal(size=exact.disparity.shape)
         if self.step > 0:
             measured = np.floor(measured / self.step + 0.5) * self.step

@@ -23,6 +23,7 @@ ROOF = {"corner": (-0.3, 0.5, -0.3), "edge_u": (0.6, 0, 0), "edge_v": (0, 0, 0.6
 # radiance 1/2. All light is 1 + 0: 1/2 of it comes straight from the lamp or by one bounce off what glows.
 INTEGRATORS = {
     "PathTracer": (sr.PathTracer(max_depth=40), 1, 1),
+    "SharedPathTracer": (sr.SharedPathTracer(max_depth=40), 1, 1),
     "SimplePathTracer": (sr.SimplePathTracer(max_depth=25), 0, 1),
     "CoursePathTracer": (sr.CoursePathTracer(next_event_estimation="mis", russian_roulette=True, max_depth=-1), 1, 1),
     "DirectLighting": (sr.DirectLighting(), 0.5, 0.75),

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from sightray._jit import kernel
 from sightray.cameras.base import CHANCE, MOMENT, Ray, sight_ray
 from sightray.cameras.base import LENS as THROUGH_LENS
-from sightray.film.film import add_sample, samples_taken
+from sightray.film.film import add_sample, brightness_so_far, samples_taken
 from sightray.filters.table import sample_filter
-from sightray.integrators.base import Radiance, radiance
-from sightray.mathlib.scalars import i64
-from sightray.mathlib.table import Table, i32_at, i64_at, table_at
+from sightray.integrators.base import (
+    COLOR,
+    MINE,
+    SO_FAR,
+    Radiance,
+    radiance,
+    radiance_of_group,
+    sight_of,
+    write_sight,
+)
+from sightray.mathlib.digits import LOW
+from sightray.mathlib.rng import stream, word
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, f64_at, f64_put, i32_at, i64_at, i64_put, scratch, table_at, vec3_at
 from sightray.mathlib.vec import dot, grey
 from sightray.samplers.base import Draws, Pair, begin, nested, number, pair
 from sightray.scene.world import CAMERA
 
+MOST = 1 << 62
 # Dimensions of a sample's draws that the engine takes; integrators have draws of their own.
 PLACE, LENS, TIME = 0, 1, 2
 
@@ -24,6 +38,35 @@ def look(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
     if not dot(ray.direction, ray.direction) > 0.0:
         return Radiance(grey(0.0), 0)
     return radiance(integrator, world, ray, draws)
+
+
+class Look(NamedTuple):
+    """A ray of sight, and what its sample weighs in the pixel."""
+
+    ray: Ray
+    draws: Draws
+    weight: f64
+
+
+@kernel
+def aim(
+    world: Table, sampler: Table, filters: Table, x: i64, y: i64, s: i64, expected: i64, centred: i64, seed: i64
+) -> Look:
+    """The ray of sample s of the pixel in column x and row y."""
+    camera = table_at(world, CAMERA)
+    chance = i64_at(camera, CHANCE)
+    draws = begin(sampler, x, y, seed, s, expected)
+    place, lens, when = pair(draws, PLACE), Pair(0.5, 0.5), 0.5
+    if chance & THROUGH_LENS != 0:
+        lens = pair(draws, LENS)
+    if chance & MOMENT != 0:
+        when = number(draws, TIME)
+    fx, fy = sample_filter(filters, place.u), sample_filter(filters, place.v)
+    dx, dy, weight = fx.offset, fy.offset, fx.weight * fy.weight
+    if s == 0 and centred != 0:
+        dx, dy, weight = 0.0, 0.0, 1.0
+    ray = sight_ray(camera, x + 0.5 + dx, y + 0.5 + dy, lens.u, lens.v, when)
+    return Look(ray, nested(draws, 0), weight)
 
 
 @kernel
@@ -37,8 +80,6 @@ def render_tile(
     told to the sampler: how many there will be in all, or 0. Samples are placed by the sampler and spread by the
     filter; with `centred` the first one goes through the pixel's centre. A non-zero word in `stop` ends the tile.
     """
-    camera = table_at(world, CAMERA)
-    chance = i64_at(camera, CHANCE)
     rays = 0
     for y in range(y0, y1):
         for x in range(x0, x1):
@@ -46,18 +87,69 @@ def render_tile(
             for s in range(samples_taken(film, pixel), i64(i32_at(target, pixel))):
                 if i64_at(stop, 0) != 0:
                     return rays
-                draws = begin(sampler, x, y, seed, s, expected)
-                place, lens, when = pair(draws, PLACE), Pair(0.5, 0.5), 0.5
-                if chance & THROUGH_LENS != 0:
-                    lens = pair(draws, LENS)
-                if chance & MOMENT != 0:
-                    when = number(draws, TIME)
-                fx, fy = sample_filter(filters, place.u), sample_filter(filters, place.v)
-                dx, dy, weight = fx.offset, fy.offset, fx.weight * fy.weight
-                if s == 0 and centred != 0:
-                    dx, dy, weight = 0.0, 0.0, 1.0
-                ray = sight_ray(camera, x + 0.5 + dx, y + 0.5 + dy, lens.u, lens.v, when)
-                found = look(integrator, world, ray, nested(draws, 0))
-                add_sample(film, pixel, found.color, weight)
+                at = aim(world, sampler, filters, x, y, s, expected, centred, seed)
+                found = look(integrator, world, at.ray, at.draws)
+                add_sample(film, pixel, found.color, at.weight)
                 rays += found.rays
+    return rays
+
+
+@kernel
+def render_tile_in_groups(
+    world: Table, integrator: Table, sampler: Table, film: Table, filters: Table, target: Table, stop: Table,
+    x0: i64, y0: i64, x1: i64, y1: i64, width: i64, expected: i64, centred: i64, seed: i64, together: i64,
+) -> i64:  # fmt: skip
+    """The same, for integrators that want the rays of neighbouring pixels: squares with a side of `together` pixels.
+
+    The squares lie elsewhere for each sample, so that none shows in the picture; at the edges of the tile they are cut.
+    """
+    rays = 0
+    first, last = MOST, 0
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            first = min(first, samples_taken(film, y * width + x))
+            last = max(last, i64(i32_at(target, y * width + x)))
+    for s in range(first, last):
+        shift = word(stream(seed, s), 0) & LOW
+        top = y0 - shift % together
+        while top < y1:
+            left = x0 - (shift >> 16) % together
+            while left < x1:
+                if i64_at(stop, 0) != 0:
+                    return rays
+                rays += render_group(
+                    world, integrator, sampler, film, filters, target, max(left, x0), max(top, y0),
+                    min(left + together, x1), min(top + together, y1), width, s, expected, centred, seed,
+                )  # fmt: skip
+                left += together
+            top += together
+    return rays
+
+
+@kernel
+def render_group(
+    world: Table, integrator: Table, sampler: Table, film: Table, filters: Table, target: Table,
+    x0: i64, y0: i64, x1: i64, y1: i64, width: i64, s: i64, expected: i64, centred: i64, seed: i64,
+) -> i64:  # fmt: skip
+    """Take sample s of those pixels of a rectangle that are to have it and have it not; returns the number of rays."""
+    sights, count = scratch(1536), 0  # 64 rays
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            pixel = y * width + x
+            if samples_taken(film, pixel) != s or s >= i64(i32_at(target, pixel)):
+                continue
+            at = aim(world, sampler, filters, x, y, s, expected, centred, seed)
+            if not dot(at.ray.direction, at.ray.direction) > 0.0:  # see `look`
+                add_sample(film, pixel, grey(0.0), at.weight)
+                continue
+            sight = sight_of(sights, count)
+            write_sight(sight, at.ray, at.draws)
+            f64_put(sight, SO_FAR, brightness_so_far(film, pixel))
+            i64_put(sight, MINE, pixel)
+            f64_put(sight, MINE + 1, at.weight)
+            count += 1
+    rays = radiance_of_group(integrator, world, sights, count)
+    for k in range(count):
+        sight = sight_of(sights, k)
+        add_sample(film, i64_at(sight, MINE), vec3_at(sight, COLOR), f64_at(sight, MINE + 1))
     return rays

@@ -14,7 +14,7 @@ import numpy as np
 from sightray import _jit
 from sightray.engine.adaptive import relative_error
 from sightray.engine.checkpoint import Checkpoint, State
-from sightray.engine.pixels import render_tile
+from sightray.engine.pixels import render_tile, render_tile_in_groups
 from sightray.engine.progress import Callback, Progress
 from sightray.engine.schedule import MOST, Schedule, Uniform, filled
 from sightray.film.film import Film
@@ -77,7 +77,7 @@ def run(
         if progress is not None:
             progress(Progress("compile", done, total, time.perf_counter() - began, 0, name))
 
-    compiled.tables.prepare(render_tile, compiling)
+    compiled.tables.prepare(_root(integrator), compiling)
     film = Film(camera.width, camera.height)
     job = _Job(
         compiled, integrator, sampler, filter, film, samples, seed, limits or Limits(), threads, progress, checkpoint
@@ -90,6 +90,11 @@ def run(
     finally:
         job.keep()
     return Outcome(film, job.rays, job.seconds(), stopped)
+
+
+def _root(integrator: Any) -> Any:
+    """The kernel that takes samples as an integrator wants them."""
+    return render_tile if integrator.together == 1 else render_tile_in_groups
 
 
 def thread_count(threads: int | None) -> int:
@@ -113,9 +118,10 @@ class _Job:
         self.stop = self.space.array(aligned(8, np.int64))
         rows = compiled.world, compiled.tables.row_of(integrator), compiled.tables.row_of(sampler)
         self.rows = (*rows, film.table, filter_table(filter, self.space))
-        self.options = expected, int(expected == 1), seed
+        together = integrator.together
+        self.options = (expected, int(expected == 1), seed, *((together,) if together > 1 else ()))
         self.threads = thread_count(threads)
-        self.kernel = _jit.native(render_tile)
+        self.kernel = _jit.native(_root(integrator))
         self.target: np.ndarray | None = None
         self.rays = self.done = self.total = 0
         self.earlier = 0.0  # seconds that went into the checkpoint

@@ -8,8 +8,8 @@ import numpy as np
 
 from sightray._jit import kernel
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, aligned, f64_at, f64_put, vec3_at, vec3_put
-from sightray.mathlib.vec import Vec3
+from sightray.mathlib.table import Table, advance, aligned, f64_at, f64_put, vec3_at, vec3_put
+from sightray.mathlib.vec import Vec3, max4
 
 SUM, WEIGHT, SQUARES, COUNT, INVALID = 0, 4, 5, 6, 7
 PIXEL_WORDS = 8
@@ -113,6 +113,14 @@ def samples_taken(film: Table, pixel: i64) -> i64:
     """How many samples a pixel has taken: the number of its next one."""
     word = pixel * PIXEL_WORDS
     return int(f64_at(film, word + COUNT) + f64_at(film, word + INVALID))
+
+
+@kernel
+def brightness_so_far(film: Table, pixel: i64) -> f64:
+    """Brightest channel of the mean of a pixel's samples; 0 where there is none."""
+    row = advance(film, pixel * PIXEL_WORDS)
+    weight = f64_at(row, WEIGHT)
+    return max(max4(vec3_at(row, SUM)) / weight, 0.0) if weight > 0.0 else 0.0
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.accelerators.item import CLEAR, TRANSLUCENT
@@ -53,29 +54,49 @@ def which_light(world: Table, own: Draws) -> f64:
     return number(own, LIGHT) if light_count(world) > 1 else 0.0
 
 
+class Arriving(NamedTuple):
+    """Light from one point of one light; a surface reflects `value * light` of it."""
+
+    light: Vec3  # over the probability of the choice, times the weight that it has beside chance
+    wi: Vec3  # where it comes from, in the surface's frame
+    value: Vec3  # f(wo, wi) |cos wi|
+    rays: i64
+
+
 @kernel
 def direct_light(
     world: Table, point: Point, start: Vec3, frame: Frame, wo: Vec3, t_min: f64, nest: Nest, bands: Table, own: Draws
 ) -> Radiance:
     """Light that a surface reflects from one light, at one of its points, over the probability of that choice."""
+    found = look_for_light(world, point, start, frame, wo, t_min, nest, bands, own)
+    return Radiance(found.value * found.light, found.rays)
+
+
+@kernel
+def look_for_light(
+    world: Table, point: Point, start: Vec3, frame: Frame, wo: Vec3, t_min: f64, nest: Nest, bands: Table, own: Draws
+) -> Arriving:
+    """Choose a light and one of its points, and see what arrives from there."""
     place = pair(own, PLACE)
+    dark = grey(0.0)
     chosen = choose_light(world, point.p, lit_normal(point), which_light(world, own))
     if chosen.light < 0:
-        return Radiance(grey(0.0), 0)
+        return Arriving(dark, dark, dark, 0)
     light = light_at(world, chosen.light)
     sample = illuminate(light, point.p, WHOLE, place.u, place.v)
     wi = into(frame, sample.direction)
     answer = bsdf(point.material, point.where, wo, wi)
-    found = answer.value * light_in(bands, light, sample.irradiance) * (1.0 / chosen.probability)
-    if max4(found) <= 0.0:
-        return Radiance(grey(0.0), 0)
+    coming = light_in(bands, light, sample.irradiance) * (1.0 / chosen.probability)
+    if max4(answer.value * coming) <= 0.0:
+        return Arriving(dark, wi, dark, 0)
     behind = crossing(world, nest, point, sample.direction) if wo.z * wi.z < 0.0 else nest
     ray = shadow_ray(point.p if wo.z * wi.z < 0.0 else start, point.p, sample.direction, sample.distance)
     left = unblocked(world, ray.o, ray.d, t_min, ray.distance - t_min, behind, bands, own)
     if max4(left) <= 0.0:
-        return Radiance(grey(0.0), 1)
+        return Arriving(dark, wi, dark, 1)
     p = sample.density * chosen.probability
-    return Radiance(found * left * (power_heuristic(p, answer.density) if p > 0.0 else 1.0), 1)
+    weight = power_heuristic(p, answer.density) if p > 0.0 else 1.0
+    return Arriving(coming * left * weight, wi, answer.value, 1)
 
 
 @kernel

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from sightray._jit import implements, kernel
-from sightray.accelerators.item import CLEAR
+from sightray.accelerators.item import CLEAR, ItemHit
 from sightray.cameras.base import Ray
 from sightray.fields import derived_array, flag, integer
 from sightray.fields import number as real
@@ -19,11 +19,11 @@ from sightray.integrators.direct import (
     light_of_skies,
     lit_normal,
 )
-from sightray.integrators.nesting import crossing, outside
+from sightray.integrators.nesting import Nest, crossing, outside
 from sightray.integrators.shading import first_step, frame_of, into, on_true_side, out_of
 from sightray.integrators.spectral import choose_bands, seen_colour
 from sightray.integrators.terminator import lifted
-from sightray.materials.base import emitted, glow_in, interior, sample_bsdf
+from sightray.materials.base import bsdf, emitted, glow_in, interior, sample_bsdf
 from sightray.mathlib.bands import BANDS_WORDS, ones
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table, scratch, table_at
@@ -69,6 +69,7 @@ DEPTH, ROULETTE_DEPTH, LIGHT_SAMPLES, CLAMP, _, BAND_TABLE = PathTracer.offsets(
 WAVELENGTH, WAY, CHOICE, MEDIUM = 0, 0, 1, 0
 MOST_EVENTS = 100_000  # a walk in a body that takes nothing away must end somewhere
 WIDEST = 0.2  # spread of a beam after a matte surface, about what a filter can still tell apart
+MATTE = 0.05  # density, per steradian, with which a matte surface sends light back to where it came from
 LOBE = 0.1  # share of a lobe's width that one sample of it stands for
 
 
@@ -76,24 +77,57 @@ LOBE = 0.1  # share of a lobe's width that one sample of it stands for
 def path_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
     table = table_at(integrator, BAND_TABLE)
     if is_null(table):
-        return walk(integrator, world, ray, draws, no_table())
+        found = walk(integrator, world, from_eye(world, ray, draws, no_table()), draws, 0)
+        return Radiance(found.color, found.rays)
     bands = scratch(BANDS_WORDS)
     choose_bands(table, number(draws, WAVELENGTH), bands)
-    found = walk(integrator, world, ray, draws, bands)
+    found = walk(integrator, world, from_eye(world, ray, draws, bands), draws, 0)
     return Radiance(seen_colour(bands, found.color), found.rays)
 
 
+class Step(NamedTuple):
+    """A random walk before its next ray."""
+
+    o: Vec3
+    d: Vec3
+    beta: Vec3  # path throughput
+    nest: Nest
+    beam: Beam
+    start: Vec3  # where the direction d was chosen, the normal there, and with which density;
+    n: Vec3
+    density: f64  # 0 for rays of sight and mirrors
+    gone: f64  # metres since then
+    t_min: f64
+    depth: i64  # bounces
+    turns: i64  # those and scatterings in media
+    event: i64  # rays of the walk so far
+
+
+class Walked(NamedTuple):
+    """What a walk has found; and where it is, if it paused."""
+
+    color: Vec3
+    rays: i64
+    events: i64  # how many of them were steps of the walk, from the eye on
+    hit: ItemHit  # the surface before which it paused; nothing (item -1) if it came to its end
+    step: Step  # with which it would go on
+
+
 @kernel
-def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) -> Radiance:
-    """One random walk from the eye; the lanes of its colours are what `bands` says."""
-    o, d = ray.origin, ray.direction
-    color, beta = grey(0.0), ones(bands)  # beta: path throughput
-    nest = outside(world)
+def from_eye(world: Table, ray: Ray, draws: Draws, bands: Table) -> Step:
+    """The beginning of a walk."""
     beam = sight_beam(world, draws, bands)
-    # Where the direction d was chosen, the normal there, and with which density; 0 for rays of sight and mirrors.
-    start, n, density, gone = o, grey(0.0), 0.0, 0.0
-    t_min = 0.0
-    rays = depth = turns = event = 0  # depth: bounces; turns: those and scatterings
+    zero = grey(0.0)
+    return Step(ray.origin, ray.direction, ones(bands), outside(world), beam, ray.origin, zero, 0.0, 0.0, 0.0, 0, 0, 0)
+
+
+@kernel
+def walk(integrator: Table, world: Table, first: Step, draws: Draws, pause: i64) -> Walked:
+    """A random walk to its end, or until one of its first `pause` rays meets a matte surface."""
+    o, d, beta, nest, beam = first.o, first.d, first.beta, first.nest, first.beam
+    start, n, density, gone, t_min = first.start, first.n, first.density, first.gone, first.t_min
+    depth, turns, event = first.depth, first.turns, first.event
+    bands, color, rays = beam.bands, grey(0.0), 0
     while event < MOST_EVENTS:
         rays += 1
         hit = find_closest(world, o, d, t_min, math.inf)
@@ -128,6 +162,9 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
             color += limited(integrator, beta * behind, turns)
             break
         point = on_seen_side(point_of(world, hit, o, d, beam), d)
+        if event <= pause and point.flags & CLEAR == 0 and is_null(nest.here) and is_matte(point):
+            here = Step(o, d, beta, nest, beam, start, n, density, gone, t_min, depth, turns, event - 1)
+            return Walked(color, rays - 1, event - 1, hit, here)
         t_min = first_step(math.nan, point.p, hit.t)
         gone += hit.t
         if point.flags & CLEAR != 0:
@@ -136,10 +173,7 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
             continue
         if point.cos_view < 0.0 and nest.depth == 0:
             beta = beta * darkened(point, o, d, hit.t, bands, own)
-        own_light = glow_in(bands, point.material, emitted(point.material, point.where, point.cos_view))
-        if max4(own_light) > 0.0:
-            weight = chance_weight(world, point.light, start, n, d, gone, density)
-            color += limited(integrator, beta * own_light * weight, turns)
+        color += limited(integrator, beta * given_off(world, point, start, n, d, gone, density, bands), turns)
         if depth >= i64_at(integrator, DEPTH):
             break
 
@@ -170,7 +204,23 @@ def walk(integrator: Table, world: Table, ray: Ray, draws: Draws, bands: Table) 
         o, start, n, density, gone = point.p, point.p, lit_normal(point), chosen.density, 0.0
         depth += 1
         turns += 1
-    return Radiance(color, rays)
+    return Walked(color, rays, event, ItemHit(math.inf, -1, 0, 0.0, 0.0), first)
+
+
+@kernel
+def given_off(world: Table, point: Point, start: Vec3, n: Vec3, d: Vec3, gone: f64, density: f64, bands: Table) -> Vec3:
+    """Light that a surface gives off itself, weighed as `chance_weight` does: looking for lights finds it, too."""
+    glow = glow_in(bands, point.material, emitted(point.material, point.where, point.cos_view))
+    if max4(glow) > 0.0:
+        return glow * chance_weight(world, point.light, start, n, d, gone, density)
+    return glow
+
+
+@kernel
+def is_matte(point: Point) -> bool:
+    """Whether a surface answers light from all around on the side that is seen; mirrors do not."""
+    side = Vec3(0.0, 0.0, 1.0 if point.cos_view >= 0.0 else -1.0)
+    return bsdf(point.material, point.where, side, side).density > MATTE
 
 
 @kernel

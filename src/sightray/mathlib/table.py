@@ -188,6 +188,12 @@ def vec3_put(table: Table, index: i64, value: Vec3) -> None:
 
 
 @primitive
+def table_put(table: Table, index: i64, target: Table) -> None:
+    """Write a pointer to another table, one that a compiled scene holds, into word `index`."""
+    table.view(np.int64)[index] = target.address
+
+
+@primitive
 def scratch(words: i64) -> Table:
     """A table of `words` eight-byte words on the stack of the calling kernel; `words` is a constant."""
     return Table(np.zeros(words))

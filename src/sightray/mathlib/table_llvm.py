@@ -75,6 +75,11 @@ def table_at(builder: Any, pointer: Any, index: Any) -> Any:
     return builder.load(element(builder, pointer, index, POINTER, 8), align=8)
 
 
+@lower(table.table_put)
+def table_put(builder: Any, pointer: Any, index: Any, target: Any) -> None:
+    builder.store(target, element(builder, pointer, index, POINTER, 8), align=8)
+
+
 @lower(table.advance)
 def advance(builder: Any, pointer: Any, words: Any) -> Any:
     return element(builder, pointer, words, I8, 8)

@@ -1,0 +1,139 @@
+"""`SharedPathTracer` paints the picture of `PathTracer`, with less noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sightray as sr
+
+SEEDS = 12
+
+
+def small(scene, height=32):
+    camera = scene.camera
+    return scene.replace(camera=camera.resized(round(height * camera.width / camera.height), height), ambient=0)
+
+
+def cornell():
+    return small(sr.load("cornell"))
+
+
+def still_life():
+    """Glass and mirrors: caustics, and matte surfaces seen in mirrors."""
+    return small(sr.load("still-life"))
+
+
+def shiny_room():
+    """Surfaces between matte and mirror, a texture, a lampshade that light passes, and a smooth coarse mesh."""
+    floor = sr.Principled(base_color=sr.Checker(even=(0.8, 0.7, 0.2), odd=0.1), roughness=0.3, metallic=0.5)
+    ball = sr.Principled(base_color=(0.7, 0.2, 0.2), roughness=0.15, clearcoat=1.0)
+    coarse = sr.Sphere(center=(0.9, 0.4, 0.2), radius=0.4, material=sr.OrenNayar(albedo=0.6, sigma=30))
+    shade = sr.Rectangle(corner=(-1.2, 1.1, -0.6), edge_u=(0.8, 0, 0), edge_v=(0, 0, 0.8),
+                         material=sr.Mix(a=sr.Lambert(albedo=0.6), b=sr.Mirror(reflectance=0.7), amount=0.5))  # fmt: skip
+    return sr.Scene(
+        sr.Box(lower=(-2, 0, -2), upper=(2, 2.5, 3), material=sr.Lambert(albedo=(0.7, 0.75, 0.8))),
+        sr.Rectangle(corner=(-2, 0.001, 3), edge_u=(4, 0, 0), edge_v=(0, 0, -5), material=floor),
+        sr.Sphere(center=(-0.3, 0.5, -0.3), radius=0.5, material=ball), coarse, shade,
+        sr.RectangleLight(corner=(-0.4, 2.4, -0.4), edge_u=(0.8, 0, 0), edge_v=(0, 0, 0.8), radiance=6),
+        sr.Sphere(center=(1.3, 1.6, -1), radius=0.2, material=sr.Emitter(radiance=(3, 1, 1))),
+        camera=sr.PerspectiveCamera(eye=(0, 1.2, 2.6), target=(0, 0.7, -1), vfov=60, width=40, height=32),
+    )  # fmt: skip
+
+
+def fog_and_sky():
+    """A body of milk, glass under a sky, and a lens with a shutter: much of it nobody shares."""
+    return sr.Scene(
+        sr.Plane(point=(0, 0, 0), normal=(0, 1, 0), material=sr.Lambert(albedo=0.6)),
+        sr.Sphere(center=(-0.8, 0.5, 0), radius=0.5, material=sr.Glass(ior=1.5)),
+        sr.Sphere(center=(0.6, 0.6, 0), radius=0.6, material=sr.Subsurface(preset="skim milk", scale=0.05)),
+        sr.EnvironmentLight(radiance=(0.5, 0.7, 1.0)),
+        sr.SphereLight(center=(0, 3, 1), radius=0.3, radiance=10),
+        camera=sr.PerspectiveCamera(eye=(0, 1.2, 4), target=(0, 0.5, 0), vfov=40, width=40, height=32),
+    )  # fmt: skip
+
+
+def pictures(scene, integrator, samples, first):
+    found = [
+        np.asarray(sr.render(scene, integrator, samples=samples, seed=first + k), np.float64) for k in range(SEEDS)
+    ]
+    return np.stack(found)
+
+
+def in_cells(images, side=8):
+    """Means over squares of pixels, (n, cells, 3)."""
+    n, h, w, _ = images.shape
+    return images.reshape(n, h // side, side, w // side, side, 3).mean(axis=(2, 4)).reshape(n, -1, 3)
+
+
+@pytest.mark.parametrize("room", [cornell, still_life, shiny_room, fog_and_sky])
+def test_the_picture_is_that_of_path_tracing(room):
+    """Means over squares of 8 by 8 pixels differ by what their spread over independent renders allows."""
+    scene = room()
+    h, w = scene.camera.height // 8 * 8, scene.camera.width // 8 * 8
+    plain = in_cells(pictures(scene, sr.PathTracer(max_depth=6), 32, 0)[:, :h, :w])
+    shared = in_cells(pictures(scene, sr.SharedPathTracer(max_depth=6), 16, 1000)[:, :h, :w])
+    error = np.sqrt((plain.var(axis=0, ddof=1) + shared.var(axis=0, ddof=1)) / SEEDS)
+    z = (plain.mean(axis=0) - shared.mean(axis=0)) / np.maximum(error, 1e-9)
+    assert np.abs(z).max() < 6.0  # Student's t with about 20 degrees of freedom
+    assert np.sqrt((z**2).mean()) < 1.3
+    whole = plain.mean(axis=(1, 2)), shared.mean(axis=(1, 2))
+    spread = np.sqrt((whole[0].var(ddof=1) + whole[1].var(ddof=1)) / SEEDS)
+    assert abs(whole[0].mean() - whole[1].mean()) < 3.5 * spread
+
+
+def test_rooms_have_less_noise():
+    """Of most pixels of a room the variance falls to a fraction."""
+    plain, shared = (pictures(cornell(), kind(max_depth=6), 16, 0) for kind in (sr.PathTracer, sr.SharedPathTracer))
+    before, after = (images.var(axis=0).mean(axis=-1) for images in (plain, shared))
+    assert np.median(before) > 3.0 * np.median(after)
+
+
+def test_caustics_have_less_noise():
+    scene = small(sr.load("still-life"), 64)
+    plain, shared = (pictures(scene, kind(max_depth=6), 8, 0) for kind in (sr.PathTracer, sr.SharedPathTracer))
+    size = plain.mean(axis=0) ** 2 + 0.01
+    assert (plain.var(axis=0) / size).mean() > 1.5 * (shared.var(axis=0) / size).mean()
+
+
+def test_who_shares_with_nobody_is_a_path_tracer():
+    scene = cornell()
+    alone = sr.render(scene, sr.SharedPathTracer(share=1), samples=2)
+    np.testing.assert_array_equal(alone, sr.render(scene, sr.PathTracer(), samples=2))
+    spectral = sr.render(scene, sr.SharedPathTracer(spectral=True), samples=2)
+    np.testing.assert_array_equal(spectral, sr.render(scene, sr.PathTracer(spectral=True), samples=2))
+
+
+@pytest.mark.parametrize("share", [3, 8])
+def test_threads_change_nothing(share):
+    scene = small(sr.load("cornell"), 48)
+    one, two = (sr.render(scene, sr.SharedPathTracer(share=share), samples=3, threads=n) for n in (1, 2))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_each_pixel_has_its_samples_where_they_are_uneven():
+    scene = cornell()
+    image = sr.render(scene, sr.SharedPathTracer(), samples=8, adaptive="error")
+    counts = image.info["sample_count"]
+    assert counts.min() > 0
+    assert counts.mean() == pytest.approx(8, rel=0.2)
+
+
+def test_a_render_goes_on_where_it_stopped(tmp_path):
+    scene, options = cornell(), {"samples": 12, "adaptive": "error"}
+    whole = sr.render(scene, sr.SharedPathTracer(), **options)
+    pieces = 0
+    while True:
+
+        def press(progress, after=2500 * (pieces + 1)):
+            if progress.stage == "render" and progress.done >= after:
+                raise KeyboardInterrupt
+
+        try:
+            again = sr.render(scene, sr.SharedPathTracer(), **options, checkpoint=tmp_path / "state",
+                              resume=pieces > 0, progress=press)  # fmt: skip
+            break
+        except KeyboardInterrupt:
+            pieces += 1
+    assert pieces >= 2
+    np.testing.assert_array_equal(whole, again)

@@ -49,6 +49,7 @@ _PUBLIC_FAMILIES = (
     "accelerators",
     "vision.layers",
     "vision.writers",
+    "vision.depth_sensors",
 )
 
 

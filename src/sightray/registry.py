@@ -40,6 +40,7 @@ FAMILIES = (
     "accelerators",
     "vision.layers",
     "vision.writers",
+    "vision.depth_sensors",
 )
 _members: dict[str, dict[str, type[Member]]] = {name: {} for name in FAMILIES}
 

@@ -53,6 +53,19 @@ def fog_and_sky():
     )  # fmt: skip
 
 
+def stripes():
+    """Lit and shaded pixels in turns, which judge differently what is worth sharing; a mirror for a wall."""
+    slats = [[(-1, 0.6, z), (1, 0.6, z), (1, 0.6, z + 0.032), (-1, 0.6, z + 0.032)] for z in np.arange(-1, 1, 0.064)]
+    faces = [t for k in range(len(slats)) for t in ((4 * k, 4 * k + 1, 4 * k + 2), (4 * k, 4 * k + 2, 4 * k + 3))]
+    return sr.Scene(
+        sr.Box(lower=(-1, 0, -1), upper=(1, 2, 1), material=sr.Lambert(albedo=0.5)),
+        sr.Mesh(vertices=np.reshape(slats, (-1, 3)), faces=faces, material=sr.Lambert(albedo=0.5)),
+        sr.Rectangle(corner=(-0.9, 0.1, -0.8), edge_u=(0, 0.4, 0), edge_v=(0, 0, 1.6), material=sr.Mirror(reflectance=0.9)),
+        sr.RectangleLight(corner=(-0.01, 1.9, -0.01), edge_u=(0.02, 0, 0), edge_v=(0, 0, 0.02), radiance=5000),
+        camera=sr.PerspectiveCamera(eye=(-0.4, 0.5, 0), target=(-0.4, 0, 0), up=(0, 0, 1), vfov=60, width=24, height=24),
+    )  # fmt: skip
+
+
 def pictures(scene, integrator, samples, first):
     found = [
         np.asarray(sr.render(scene, integrator, samples=samples, seed=first + k), np.float64) for k in range(SEEDS)
@@ -60,19 +73,21 @@ def pictures(scene, integrator, samples, first):
     return np.stack(found)
 
 
-def in_cells(images, side=8):
+def in_cells(images, side):
     """Means over squares of pixels, (n, cells, 3)."""
     n, h, w, _ = images.shape
     return images.reshape(n, h // side, side, w // side, side, 3).mean(axis=(2, 4)).reshape(n, -1, 3)
 
 
-@pytest.mark.parametrize("room", [cornell, still_life, shiny_room, fog_and_sky])
-def test_the_picture_is_that_of_path_tracing(room):
-    """Means over squares of 8 by 8 pixels differ by what their spread over independent renders allows."""
+@pytest.mark.parametrize(
+    ("room", "side"), [(cornell, 8), (still_life, 8), (shiny_room, 8), (fog_and_sky, 8), (stripes, 2)]
+)
+def test_the_picture_is_that_of_path_tracing(room, side):
+    """Means over squares of pixels differ by what their spread over independent renders allows."""
     scene = room()
-    h, w = scene.camera.height // 8 * 8, scene.camera.width // 8 * 8
-    plain = in_cells(pictures(scene, sr.PathTracer(max_depth=6), 32, 0)[:, :h, :w])
-    shared = in_cells(pictures(scene, sr.SharedPathTracer(max_depth=6), 16, 1000)[:, :h, :w])
+    h, w = scene.camera.height // side * side, scene.camera.width // side * side
+    plain = in_cells(pictures(scene, sr.PathTracer(max_depth=6), 32, 0)[:, :h, :w], side)
+    shared = in_cells(pictures(scene, sr.SharedPathTracer(max_depth=6), 16, 1000)[:, :h, :w], side)
     error = np.sqrt((plain.var(axis=0, ddof=1) + shared.var(axis=0, ddof=1)) / SEEDS)
     z = (plain.mean(axis=0) - shared.mean(axis=0)) / np.maximum(error, 1e-9)
     assert np.abs(z).max() < 6.0  # Student's t with about 20 degrees of freedom
@@ -80,6 +95,28 @@ def test_the_picture_is_that_of_path_tracing(room):
     whole = plain.mean(axis=(1, 2)), shared.mean(axis=(1, 2))
     spread = np.sqrt((whole[0].var(ddof=1) + whole[1].var(ddof=1)) / SEEDS)
     assert abs(whole[0].mean() - whole[1].mean()) < 3.5 * spread
+
+
+def two_rooms():
+    """Two rooms that are open to the viewer, with a wall between, seen edge on; the lamp is in the right one."""
+
+    def side(corner, u, v):
+        return sr.Rectangle(corner=corner, edge_u=u, edge_v=v, material=sr.Lambert(albedo=0.8))
+
+    return sr.Scene(
+        side((-1, 0, -2), (2, 0, 0), (0, 1, 0)), side((-1, 0, 0), (2, 0, 0), (0, 0, -2)),
+        side((-1, 1, 0), (2, 0, 0), (0, 0, -2)), side((-1, 0, 0), (0, 1, 0), (0, 0, -2)),
+        side((1, 0, 0), (0, 1, 0), (0, 0, -2)), side((0, 0, 0), (0, 1, 0), (0, 0, -2)),
+        sr.RectangleLight(corner=(0.3, 0.99, -1.2), edge_u=(0.4, 0, 0), edge_v=(0, 0, 0.4), radiance=8),
+        camera=sr.PerspectiveCamera(eye=(0, 0.5, 4), target=(0, 0.5, 0), vfov=16, width=32, height=32),
+    )  # fmt: skip
+
+
+def test_walls_keep_light_out():
+    """Pixels on both sides of the wall are in the same squares; none may see what is behind it."""
+    image = np.asarray(sr.render(two_rooms(), sr.SharedPathTracer(max_depth=5), samples=16))
+    assert image[:, :15].max() == 0
+    assert image[8:24, 17:].min() > 0
 
 
 def test_rooms_have_less_noise():

@@ -11,6 +11,7 @@ from sightray.images import Image
 
 SQUARES, SQUARE, TEXELS = (7, 5), 0.1, 240  # metres, texels along a square
 TAG, TAG_ID, CELLS, QUIET = 0.2, 7, 8, 2  # metres, cells of a tag with its border, and white cells around it
+PAGE = TAG * (CELLS + 2 * QUIET) / CELLS  # metres: a tag with its margin
 AXIS = np.array([0.3, 0.2, 1.0]) / np.linalg.norm((0.3, 0.2, 1.0))  # from a board to the camera: it leans by 20 degrees
 PSF = sr.GaussianFilter(radius=2.1, sigma=0.7)  # pixels: a lens that just resolves its pixels
 
@@ -36,8 +37,8 @@ def charuco() -> tuple[Any, sr.Rectangle, np.ndarray]:
     return board, plate(page, w, h), corners
 
 
-def apriltag() -> tuple[sr.Rectangle, np.ndarray]:
-    """A tag of the family 36h11 in its white margin, and its corners, (4, 3), clockwise from the top left."""
+def tag_page() -> np.ndarray:
+    """A tag of the family 36h11 in its white margin, from 0 to 1."""
     import cv2
 
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
@@ -45,8 +46,13 @@ def apriltag() -> tuple[sr.Rectangle, np.ndarray]:
     page[100 * QUIET : -100 * QUIET, 100 * QUIET : -100 * QUIET] = (
         cv2.aruco.generateImageMarker(dictionary, TAG_ID, 100 * CELLS, borderBits=1) / 255.0
     )
-    side, c = TAG * (CELLS + 2 * QUIET) / CELLS, TAG / 2
-    return plate(page, side, side), np.array([(-c, c, 0), (c, c, 0), (c, -c, 0), (-c, -c, 0)])
+    return page
+
+
+def apriltag() -> tuple[sr.Rectangle, np.ndarray]:
+    """The tag as a scene, and its corners, (4, 3), clockwise from the top left."""
+    side, c = PAGE, TAG / 2
+    return plate(tag_page(), side, side), np.array([(-c, c, 0), (c, c, 0), (c, -c, 0), (-c, -c, 0)])
 
 
 def camera_at(distance: float, **lens: float) -> sr.CalibratedCamera:
@@ -61,6 +67,27 @@ def grey_picture(page: sr.Rectangle, camera: sr.Camera, samples: int = 32, filte
     scene = sr.Scene(page, light, camera=camera, background=0.4, transfer="floor")
     picture = sr.render(scene, sr.Whitted(), samples=samples, filter=filter)
     return np.ascontiguousarray(picture.to_bytes()[..., 1])
+
+
+def perfect_tag(camera: sr.CalibratedCamera, levels: tuple[float, float, float], half: int = 150) -> tuple[Any, Any]:
+    """The tag through `PSF` by numpy alone, without noise: the first pixel (x, y), and (2 half, 2 half).
+
+    `levels` are those of black, white, and what is around the page.
+    """
+    page, fine = tag_page(), 6
+    x, y = np.floor(camera.project(np.zeros(3))).astype(int) - half
+    ticks = (np.arange(2 * half * fine) + 0.5) / fine
+    across = camera.intrinsics() @ np.linalg.inv(camera.world_from_camera())[:3][:, [0, 1, 3]]
+    columns, rows = np.meshgrid(x + ticks, y + ticks)
+    u, v, w = np.einsum("ij,jhw->ihw", np.linalg.inv(across), np.stack([columns, rows, np.ones_like(rows)]))
+    places = np.floor(np.stack([0.5 - v / w / PAGE, u / w / PAGE + 0.5]) * len(page)).astype(int)
+    on = ((places >= 0) & (places < len(page))).all(axis=0)
+    light = np.full(on.shape, levels[2])
+    light[on] = np.where(page[places[0][on], places[1][on]] > 0.5, levels[1], levels[0])
+    away = ticks - (np.arange(2 * half)[:, None] + 0.5)
+    weights = np.maximum(np.exp(-(away**2) / (2 * PSF.sigma**2)) - np.exp(-(PSF.radius**2) / (2 * PSF.sigma**2)), 0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return np.array([x, y]), weights @ light @ weights.T
 
 
 def charuco_corners(board: Any, grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

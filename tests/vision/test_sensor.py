@@ -20,7 +20,9 @@ def grey(value: float, height: int = 200, width: int = 200) -> np.ndarray:
 @pytest.mark.parametrize("read_noise", [0.0, 8.0])
 def test_photon_transfer(electrons, read_noise):
     """Mean and variance of the numbers: K times the electrons, and K² (electrons + read noise²) + 1/12, K numbers each."""
-    sensor = sr.vision.Sensor(exposure=0.5, sensitivity=2.0, full_well=10_000, read_noise=read_noise, bits=16, black=0.01)
+    sensor = sr.vision.Sensor(
+        exposure=0.5, sensitivity=2.0, full_well=10_000, read_noise=read_noise, bits=16, black=0.01
+    )
     numbers = sensor.capture(grey(electrons), seed=5).astype(float).ravel()
     gain = 65535 * 0.99 / 10_000
     mean, variance = 655.35 + gain * electrons, gain**2 * (electrons + read_noise**2) + 1 / 12

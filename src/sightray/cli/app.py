@@ -26,6 +26,7 @@ from sightray.cli.common import (
 from sightray.cli.dataset import dataset
 from sightray.cli.heatmap import heatmap
 from sightray.cli.label import label
+from sightray.cli.sense import sense
 
 app = typer.Typer(
     help="Sightray follows rays of sight through scenes: pictures to look at and pictures to measure.",
@@ -34,6 +35,7 @@ app = typer.Typer(
 app.add_typer(bench)
 app.command()(heatmap)
 app.command()(label)
+app.command()(sense)
 app.command()(dataset)
 
 

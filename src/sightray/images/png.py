@@ -5,6 +5,7 @@ Colour profiles, gamma chunks and EXIF orientation are ignored: the rows come as
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
 from typing import IO, Any
@@ -127,6 +128,13 @@ def write_png(target: StrPath | IO[bytes], pixels: NDArray[np.uint8], *, compres
     if compression not in range(10):
         raise SceneError(f"PNG compression {compression!r}; allowed: 0 to 9")
     _to_pillow(pixels).save(target, format="PNG", compress_level=compression)
+
+
+def png_bytes(pixels: NDArray[np.uint8], *, compression: int = 6) -> bytes:
+    """A PNG file of (h, w) or (h, w, 1 | 3 | 4) uint8."""
+    stream = io.BytesIO()
+    write_png(stream, pixels.reshape(*pixels.shape[:2], -1), compression=compression)
+    return stream.getvalue()
 
 
 def write_jpeg(path: Path, pixels: NDArray[np.uint8], *, quality: int = 95) -> None:

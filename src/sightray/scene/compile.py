@@ -113,7 +113,10 @@ class Tables:
 
 
 class Compiled:
-    """A scene as tables: `world` for kernels, `items` for people who ask what item number 7 is."""
+    """A scene as tables: `world` for kernels, `items` for people who ask what item number 7 is.
+
+    `lower` and `upper`, (n, 3), are the items' boxes in the world; last come those of the meshes that were put together.
+    """
 
     def __init__(self, scene: Scene, accelerator: Any):
         self.scene = scene
@@ -125,8 +128,8 @@ class Compiled:
     def _pack(self, accelerator: Any) -> Table:
         tables, scene, space = self.tables, self.scene, self.tables.space
         items = space.array(aligned((len(self.items) + 1) * item_row.ITEM_WORDS, np.float64))
-        lower, upper = self._pack_items(items)
-        tree = accelerator.build_scene(space, items, lower, upper, self.items)
+        self.lower, self.upper = self._pack_items(items)
+        tree = accelerator.build_scene(space, items, self.lower, self.upper, self.items)
         tables.add(accelerator, tree)
         world = space.row(world_row.WORLD_WORDS)
         lamps, own = scene.lights, set(light_indices(scene))

@@ -26,6 +26,7 @@ from sightray.vision.writers.base import Writer, as_writer
 MANIFEST = "manifest.json"
 SPARE = 1.05  # by which the room must exceed what was measured
 ASIDE = ".sightray-*"  # names of files that are being written
+SENSORS = "sensors"  # the format of what sensors deliver, which recipes with sensors always have
 VERSION = 1  # of the marks and the manifest
 
 
@@ -90,6 +91,8 @@ def make_dataset(
     total = recipe.frames if frames is None else _whole("frames", frames, 1, 10**9)
     workers = _whole("workers", workers, 1, 1024)
     writers = [as_writer(one) for one in (recipe.formats if formats is None else formats)]
+    if recipe.sensed and not any(writer.label == SENSORS for writer in writers):
+        writers.append(as_writer(SENSORS))
     root = check_folder(Path(folder))
     _check_recipe(recipe, writers)
     strange = [type(writer).__name__ for writer in writers if not type(writer).__module__.startswith("sightray.")]

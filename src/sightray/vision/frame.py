@@ -24,17 +24,16 @@ from sightray.scene.compile import Item
 from sightray.scene.parallel import run_chunks
 from sightray.scene.queries import asked
 from sightray.scene.world import FLAGS
-from sightray.shapes.mesh import Mesh
 from sightray.vision import record as words
 from sightray.vision.casting import cast_tile
 from sightray.vision.extents import extent
 from sightray.vision.layers.base import Layer, fill
+from sightray.vision.picking import BOX_WORDS, MOST_CASTS
 from sightray.vision.poses import object_pose
 from sightray.vision.rolling import Rolling
 from sightray.vision.view import Motion, View
 
 _WHITTED, _SAMPLER = Whitted(), default_sampler()
-FEW_CASTS = 12  # items up to which asking each of them in packets is faster than one ray at a time through the tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +88,6 @@ class Frame:
 
     # ------------------------------------------------------------------------------------------------- what is there
 
-    def require_still(self) -> None:
-        """Raise an `UnsupportedError` where objects move while rows are exposed one after the other."""
-        self.view.require_still()
-
     @cached_property
     def objects(self) -> tuple[ObjectInfo, ...]:
         """The objects that can be seen, lights with a surface among them, in the scene's order."""
@@ -144,10 +139,8 @@ class Frame:
         return self._rolling[name]
 
     def motion(self, name: str) -> Motion:
-        """How everything moved to that view; `UnsupportedError` where things move under a rolling shutter."""
+        """How everything moved to that view, where nothing moves while rows are exposed: see `rolls`."""
         if name not in self._motions:
-            self.require_still()
-            self.other(name).require_still()
             self._motions[name] = Motion(self.view, self.other(name))
         return self._motions[name]
 
@@ -216,6 +209,9 @@ class Frame:
         casts = self._casts()
         link(row, words.KINDS, space.array(kinds))
         link(row, words.CASTS, space.array(np.array([*casts, 0], np.int32)))
+        boxes = aligned((len(casts) + 1, BOX_WORDS), np.float64)
+        boxes[:-1, :3], boxes[:-1, 4:7] = self.compiled.lower[casts], self.compiled.upper[casts]
+        link(row, words.BOXES, space.array(boxes))
         numbers = row.view(np.int64)
         numbers[[words.CAST_COUNT, words.COLUMNS, words.ROWS, words.SCALE, words.DETAIL]] = (
             len(casts), self.width * scale, self.height * scale, scale, detail,
@@ -233,15 +229,14 @@ class Frame:
         return row
 
     def _casts(self) -> list[int]:
-        """The items to be asked one after the other, or none where rays go through the tree."""
+        """The items that tiles pick from, or none where all rays go through the tree."""
         merged, items = self.compiled.merged, self.compiled.items
         if self.compiled.world.view(np.int64)[FLAGS] & (CUTOUT | CLEAR) or self.view.blurred:
             return []
         inside = set() if merged is None else set(merged.members)
         alone = [k for k in range(len(items)) if k not in inside]
         casts = alone if merged is None else [*alone, len(items)]
-        meshes = merged is not None or any(isinstance(items[k].shape, Mesh) for k in alone)
-        return casts if meshes and len(casts) <= FEW_CASTS else []
+        return casts if len(casts) <= MOST_CASTS else []
 
     def _object_frames(self, space: Space) -> Table:
         """For each item ``object_from_world`` of its object, as columns; then centre and diagonal of the object's box."""

@@ -3,16 +3,19 @@
 Where a path ends at the point X, which moves to X', the other picture shows it at the pixel x' whose path, by the same
 surfaces as they are there, passes through X'. With o and d the last ray of that path, two numbers have to vanish: the
 parts of (X' - o) / |X' - o| - d across the ray. Newton's method solves for x'; the derivatives are central
-differences, whose error only costs steps, not digits. What escapes is at infinity, and keeps its direction.
+differences, whose error only costs steps, not digits. What escapes is at infinity, and keeps its direction. Where things
+move while rows are exposed one after the other, X' and the surfaces are those of the time of the row of x'.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from sightray.vision.paths import PathEnds, path_ends
+from sightray.vision.rolling import row_times
 
 STEP = 1e-5  # pixels, of differences
 STEPS = 40  # of Newton's method
@@ -22,23 +25,25 @@ DONE = 1e-10  # pixels; the last step of a solution is shorter
 EXACT = 1e-9  # radians by which a solution's last ray may miss the point
 
 
+Target = Callable[[np.ndarray, np.ndarray], np.ndarray]  # numbers of paths, pixels (n, 2): where their ends are then
+
+
 def path_flow(frame: Any, how: int) -> np.ndarray:
     """Flow to the picture `next` of what is seen by mirrors or through glass, (h, w, 2); NaN where there is none."""
     from sightray.vision.layers.flow import pixel_centres
 
-    motion, other = frame.motion("next"), frame.beside("next")
+    other = frame.beside("next")
     pixels = pixel_centres(frame.width, frame.height).reshape(-1, 2)
-    names = np.append(motion.item, -1)
+    names = np.append(frame.partner_items("next"), -1)
     ends = path_ends(frame, pixels, how, names)
     some = np.flatnonzero((ends.way != 0) & ((ends.item < 0) | (names[ends.item] >= 0)))
     flow = np.full(pixels.shape, np.nan)
-    target = np.full((len(pixels), 3), np.nan)
-    target[some] = targets(motion, PathEnds(*(part[some] for part in ends)))
+    target = targets(frame, ends, pixels, some)
     start, todo = pixels, some
     for _ in range(ROUNDS):
         if not len(todo):
             break
-        flow[todo] = solve(other, how, start[todo], target[todo], ends.item[todo] < 0, ends.way[todo]) - pixels[todo]
+        flow[todo] = solve(other, how, start, todo, target, ends) - pixels[todo]
         lost = some[np.isnan(flow[some, 0])]
         guess = neighbours_flow(flow.reshape(frame.height, frame.width, 2), ends.way.reshape(frame.height, frame.width))
         start = pixels + guess.reshape(-1, 2)
@@ -61,31 +66,53 @@ def neighbours_flow(flow: np.ndarray, way: np.ndarray) -> np.ndarray:
     return np.where(count[..., None] > 0, total / np.maximum(count, 1)[..., None], np.nan)
 
 
-def targets(motion: Any, ends: PathEnds) -> np.ndarray:
-    """Where the ends are in the other scene, (n, 3); directions for what escapes."""
+def targets(frame: Any, ends: PathEnds, pixels: np.ndarray, some: np.ndarray) -> Target:
+    """Where the ends of some paths are in the other scene, at the time at which it exposes a pixel; of what escapes the
+    direction."""
     moved = ends.direction.copy()
-    for index in np.unique(ends.item[ends.item >= 0]):
-        these = np.flatnonzero(ends.item == index)
-        points, vertices = ends.position[these], motion.vertices[index]
-        if vertices is not None:
-            corners = vertices[motion.before.compiled.items[index].shape.faces[ends.primitive[these]]]
-            u, v = ends.weights[these, :1], ends.weights[these, 1:]
-            points = corners[:, 0] + (corners[:, 1] - corners[:, 0]) * u + (corners[:, 2] - corners[:, 0]) * v
-        moved[these] = points @ motion.moves[index, :3, :3].T + motion.moves[index, :3, 3]
-    return moved
+    items = [(index, some[ends.item[some] == index]) for index in np.unique(ends.item[some]) if index >= 0]
+    if not frame.rolls("next"):
+        for index, these in items:
+            moved[these] = moved_ends(frame.motion("next"), index, PathEnds(*(part[these] for part in ends)))
+        return lambda paths, _: moved[paths]
+
+    rolling, after, times = frame.rolling("next"), frame.other("next"), row_times(frame.view, pixels[:, 1])
+    for index, these in items:
+        moved[these] = rolling.inside(index, ends.position[these], ends.primitive[these], times[these])
+
+    def at(paths: np.ndarray, there: np.ndarray) -> np.ndarray:
+        found, own, then = moved[paths], ends.item[paths], row_times(after, there[:, 1])
+        for index in np.unique(own[own >= 0]):
+            found[own == index] = rolling.outside(index, found[own == index], then[own == index])
+        return found
+
+    return at
 
 
-def solve(
-    frame: Any, how: int, start: np.ndarray, target: np.ndarray, escaped: np.ndarray, way: np.ndarray
-) -> np.ndarray:
-    """The pixels whose paths, by the ways given, lead to the targets: (n, 2); NaN where there is none."""
-    x, active, solved = start.copy(), np.arange(len(start)), np.full(start.shape, np.nan)
+def moved_ends(motion: Any, index: int, ends: PathEnds) -> np.ndarray:
+    """Where ends on an item are in the other scene, (n, 3), if nothing moves while rows are exposed."""
+    points, vertices = ends.position, motion.vertices[index]
+    if vertices is not None:
+        corners = vertices[motion.before.compiled.items[index].shape.faces[ends.primitive]]
+        u, v = ends.weights[:, :1], ends.weights[:, 1:]
+        points = corners[:, 0] + (corners[:, 1] - corners[:, 0]) * u + (corners[:, 2] - corners[:, 0]) * v
+    return points @ motion.moves[index, :3, :3].T + motion.moves[index, :3, 3]
+
+
+def solve(frame: Any, how: int, start: np.ndarray, paths: np.ndarray, target: Target, wanted: PathEnds) -> np.ndarray:
+    """The pixels whose paths, by the ways of those wanted, lead to the targets of some `paths`; NaN where there is none.
+
+    `start` and `wanted` are for all paths; the answer, (n, 2), is for those numbered.
+    """
+    x, active, solved = start[paths], np.arange(len(paths)), np.full((len(paths), 2), np.nan)
+    escaped, way = wanted.item[paths] < 0, wanted.way[paths]
     names = np.arange(len(frame.compiled.items) + 1)
     for _ in range(STEPS):
         offsets = np.array([[0, 0], [STEP, 0], [-STEP, 0], [0, STEP], [0, -STEP]])
         probes = (x[active, None] + offsets).reshape(-1, 2)
         ends = path_ends(frame, probes, how, names)
-        error = misses(ends, np.repeat(target[active], 5, axis=0), np.repeat(escaped[active], 5)).reshape(-1, 5, 3)
+        goal = target(np.repeat(paths[active], 5), probes)
+        error = misses(ends, goal, np.repeat(escaped[active], 5)).reshape(-1, 5, 3)
         ways = ends.way.reshape(-1, 5)
         error = across(error, ends.direction.reshape(-1, 5, 3)[:, 0])
         slope = np.stack([error[:, 1] - error[:, 2], error[:, 3] - error[:, 4]], axis=-1) / (2 * STEP)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sightray._jit import kernel
-from sightray.accelerators.item import ItemHit
+from sightray.accelerators.item import MOVED, MOVING, ItemHit, item_at
 from sightray.bvh.bvh8 import int_at
 from sightray.cameras.base import sight_ray
 from sightray.integrators.shading import first_step
@@ -26,7 +26,7 @@ from sightray.mathlib.vec import Vec3, max3, normalize
 from sightray.scene.crossings import MESH
 from sightray.scene.parallel import run_chunks
 from sightray.scene.query_kernels import exact_hit, hit_point
-from sightray.scene.world import find_closest, on_seen_side, point_of, thin_beam
+from sightray.scene.world import ITEMS, find_closest, on_seen_side, point_of, thin_beam
 from sightray.vision.record import CAMERA, KINDS, PATH_NAMES, WORLD
 
 NO_WAY, MIRRORED, REFRACTED = 0, 1, 2  # how a path goes on at a surface
@@ -83,9 +83,11 @@ def trace_path(frame: Table, x: f64, y: f64, first: i64, end: Table) -> None:
         wanted = NO_WAY
         hit = find_closest(world, o, d, t_min, math.inf)
 
-    # Describe the end.
+    # Describe the end; where what moves is depends on the time, which only rays know.
     position = Vec3(math.nan, math.nan, math.nan)
-    if hit.item >= 0:
+    if hit.item >= 0 and i64_at(item_at(table_at(world, ITEMS), hit.item), MOVED) == MOVING:
+        position = o + d * hit.t
+    elif hit.item >= 0:
         if int_at(kinds, hit.item) == MESH:
             hit = exact_hit(world, kinds, hit, o, d)
         position = hit_point(world, kinds, hit, o, d)
@@ -118,7 +120,6 @@ def trace_paths(frame: Table, pixels: Table, first: i64, last: i64, how: i64, en
 def path_ends(frame: Any, pixels: np.ndarray, how: int, names: np.ndarray | None = None) -> PathEnds:
     """Ends of the paths through pixel coordinates, (n, 2). `names` calls the items on the way what they are called in
     another scene, so that ways can be compared."""
-    frame.require_still()
     row, space = frame.row(names=names)
     run = frame.kernel(trace_paths)
     pixels = np.ascontiguousarray(pixels, np.float64)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from copy import copy
 
+import numpy as np
+
 from sightray.cameras.base import Camera
 from sightray.engine.run import run
 from sightray.filters.box import BoxFilter
@@ -16,7 +18,7 @@ from sightray.scene.compile import Compiled, compile_scene
 from sightray.scene.scene import Scene
 from sightray.scene.world import CAMERA
 from sightray.vision.label import make_labels
-from sightray.vision.shot import Shot
+from sightray.vision.shot import PICTURE, Shot
 from sightray.vision.take import Take
 from sightray.vision.view import View
 from sightray.vision.writers.base import Writer
@@ -44,15 +46,38 @@ def photograph(take: Take, writers: Iterable[Writer], samples: int, threads: int
         other = take.cameras[names[1 - index]] if take.stereo else None
         labels = make_labels(take.scene, layers, camera=camera, next=following, stereo=other, classes=take.classes,
                              threads=threads)  # fmt: skip
-        image = None
+        for device in take.depth_sensors.values():
+            device.accept(take.scene.replace(camera=camera))
+        image = delivered = None
+        measured: dict[str, np.ndarray] = {}
         if samples:
             seen, eye = (take.scene, camera) if take.blurred is None else (take.blurred, take.shutters[name])
             image = picture(seen, eye, samples, take.seeds[index], threads)
+            measured = measure(take, camera, take.seeds[index], threads)
+            if take.sensor is not None:
+                delivered = take.sensor.capture(image, seed=take.seeds[index], frame=take.frame)
         shots.append(Shot(
             labels, image, frame=take.frame, camera=index, cameras=names, sequence=take.sequence, step=take.step,
-            time=take.time, targets=take.targets, threads=threads,
+            time=take.time, trajectory=take.trajectory, next_time=take.next_time, targets=take.targets, threads=threads,
+            delivered=delivered, measured=measured,
+            bits=8 if take.sensor is None else take.sensor.bits, devices=devices_of(take) if samples else {},
         ))  # fmt: skip
     return shots
+
+
+def measure(take: Take, camera: Camera, seed: int, threads: int | None) -> dict[str, np.ndarray]:
+    """What each depth sensor of a take measures around one of its cameras; each has noise of its own."""
+    scene = take.scene.replace(camera=camera)
+    return {
+        name: device.capture(scene, seed + 1 + k, take.frame, threads)
+        for k, (name, device) in enumerate(take.depth_sensors.items())
+    }
+
+
+def devices_of(take: Take) -> dict[str, str]:
+    """The sensors of a take in words."""
+    own = {} if take.sensor is None else {PICTURE: repr(take.sensor)}
+    return own | {name: repr(device) for name, device in take.depth_sensors.items()}
 
 
 def picture(scene: Scene, camera: Camera, samples: int, seed: int, threads: int | None) -> Image:

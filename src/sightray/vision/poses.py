@@ -67,12 +67,30 @@ def item_motion(before: Item, after: Item) -> tuple[np.ndarray, np.ndarray | Non
     SceneError
         If the two are not the same material body: another kind of shape, or one of another form.
     """
-    a, b = before.shape, after.shape
-    if isinstance(a, Mesh) and isinstance(b, Mesh) and a is not b and not np.array_equal(a.vertices, b.vertices):
-        if not np.array_equal(a.faces, b.faces):
-            raise _another(before, "faces")
-        return after.transform.matrix, b.vertices
+    if deformed(before, after):
+        return after.transform.matrix, after.shape.vertices  # type: ignore[attr-defined]
     return after.transform.matrix @ shape_motion(before, after) @ before.transform.inverse, None
+
+
+def deformed(before: Item, after: Item) -> bool:
+    """Whether an item is a mesh whose vertices have moved within its own space; `SceneError` if its faces changed."""
+    a, b = before.shape, after.shape
+    if not (isinstance(a, Mesh) and isinstance(b, Mesh)) or a is b or np.array_equal(a.vertices, b.vertices):
+        return False
+    if not np.array_equal(a.faces, b.faces):
+        raise _another(before, "faces")
+    return True
+
+
+def on_deformed(before: Mesh, after: Mesh, primitive: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Where points on triangles of a mesh, (n, 3), are after it was deformed, by their barycentric weights: (n, 3)."""
+    a, b, c = np.moveaxis(before.vertices[before.faces[primitive]], 1, 0)
+    to, n = points - a, np.cross(b - a, c - a)
+    size = (n * n).sum(axis=1, keepdims=True)
+    v = (np.cross(to, c - a) * n).sum(axis=1, keepdims=True) / size
+    w = (np.cross(b - a, to) * n).sum(axis=1, keepdims=True) / size
+    a, b, c = np.moveaxis(after.vertices[after.faces[primitive]], 1, 0)
+    return a + (b - a) * v + (c - a) * w
 
 
 def shape_motion(before: Item, after: Item) -> np.ndarray:

@@ -47,6 +47,8 @@ KEYS = (
     "sequence",
     "exposure",
     "readout",
+    "sensor",
+    "depth_sensors",
     "scene",
     "ground",
     "place",
@@ -130,6 +132,11 @@ class Recipe:
                     if file.suffix.lower() in (".yaml", ".yml"):
                         pending.append((file, parse(read_text(file, self.limits), file, self.limits)))
         return dict(sorted(found.items()))
+
+    @property
+    def sensed(self) -> bool:
+        """Whether it names sensors."""
+        return "sensor" in self.root.value or "depth_sensors" in self.root.value
 
     def random_sizes(self) -> list[str]:
         """Names of the entries of `place` whose size differs from picture to picture."""

@@ -20,6 +20,7 @@ from sightray.vision.animation import Animation
 from sightray.vision.dice import Dice
 from sightray.vision.placing import TURNS, Ground, Model, Placed, place
 from sightray.vision.recipe_motion import motion_of, rig_of, view_of
+from sightray.vision.recipe_sensors import depth_sensors_of, sensor_of
 from sightray.vision.take import Take
 from sightray.vision.trajectory import Around, Trajectory
 
@@ -44,6 +45,7 @@ class Stage:
         self.motions: dict[str, Trajectory] = {}
         self.left_out = 0
         self._scenes: dict[int, Scene] = {}
+        self.sensor, self.depth_sensors = sensor_of(self), depth_sensors_of(self)
         entries = self._entries()
         for category in dict.fromkeys(category for _, _, category in entries):
             self.classes[f"category {category}"] = category  # numbers the classes alike in all frames
@@ -205,6 +207,9 @@ class Stage:
             time=time if length > 1 else frame / rate, stereo=rig is not None and rig.rectified and not readout,
             blurred=blurred, shutters=shutters, targets=tuple(self.targets) if "place" in self.top else None,
             seeds=tuple(seeds.at(k).whole() for k in range(len(cameras))), note={"left_out": self.left_out},
+            sensor=self.sensor, depth_sensors=self.depth_sensors,
+            trajectory=self.animation.camera if length > 1 else None,
+            next_time=(step + 1) / rate if step + 1 < length else None,
         )  # fmt: skip
 
     def _moment(self, step: int, rate: float) -> tuple[Scene, dict[str, Any]]:

@@ -25,12 +25,13 @@ WORLD, CAMERA, KINDS, CASTS, CAST_COUNT = 0, 1, 2, 3, 4
 COLUMNS, ROWS, SCALE, DETAIL = 5, 6, 7, 8  # SCALE: rays along a pixel's side; COLUMNS and ROWS count rays
 CLASS_OF_ITEM, MATERIAL_OF_ITEM, OBJECT_FRAMES = 9, 10, 11
 NEXT, PREVIOUS, STEREO = 12, 13, 14  # rows of `view.Motion`, or null
-INTEGRATOR, SAMPLER, PATH_NAMES = 15, 32, 33
+INTEGRATOR, SAMPLER, PATH_NAMES, BOXES = 15, 32, 33, 34  # BOXES: of the items that are cast at, see `vision.picking`
 CAMERA_FROM_WORLD = 16
 FRAME_WORDS = 40
 OBJECT_FRAME_WORDS = 24  # of each item: object_from_world of its object, then centre and diagonal of its box
 
-RAY_ONLY, POINT, SURFACE = 0, 1, 2  # values of DETAIL: what is computed of a hit beside t, item and primitive
+# Values of DETAIL: what is computed of a hit beside t, item and primitive. FACE: position and geometric normal.
+RAY_ONLY, POINT, FACE, SURFACE = 0, 1, 2, 3
 
 
 @kernel

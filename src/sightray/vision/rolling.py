@@ -9,25 +9,25 @@ slower than rows do.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from sightray._jit import kernel
 from sightray.cameras.base import sight_ray
-from sightray.errors import UnsupportedError
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put, i64_at, table_at
 from sightray.scene.compile import Item
 from sightray.scene.instance import frozen
 from sightray.scene.parallel import run_chunks
 from sightray.scene.world import find_closest
-from sightray.vision.poses import object_pose, shape_motion
+from sightray.vision.poses import deformed, object_pose, on_deformed, shape_motion
 from sightray.vision.record import CAMERA, WORLD
 from sightray.vision.view import FAR, View, partners
 
 STEPS, EXACT = 60, 1e-14  # substitutions; seconds
+FOLLOWED = ("ray_origin", "ray_direction", "position", "item", "primitive")  # layers that `Rolling` reads
 CLOSE = 1e-6  # of the way to a point: what is met closer to it is the surface that it lies on
 
 
@@ -99,6 +99,7 @@ class Rolling:
     def _found(self) -> tuple[np.ndarray, np.ndarray]:
         values, height, width = self.frame.values, self.frame.height, self.frame.width
         position, item = values["position"].reshape(-1, 3), values["item"].ravel()
+        primitive = values["primitive"].ravel()
         times = row_times(self.before, np.repeat(np.arange(height) + 0.5, width))
         points = (values["ray_origin"] + values["ray_direction"] * FAR).reshape(-1, 3)
         pixels = self.after.project(points)
@@ -106,20 +107,23 @@ class Rolling:
             own = item == index
             points[own], pixels[own] = np.nan, np.nan
             if self.item[index] >= 0:
-                pixels[own], points[own] = self._follow(index, position[own], times[own])
+                inside = self.inside(index, position[own], primitive[own], times[own])
+                body = partial(self.outside, index, inside)
+                pixels[own], points[own] = seen_from(self.after, body, len(inside))
         return pixels.reshape(height, width, 2), points.reshape(height, width, 3)
 
-    def _follow(self, index: int, position: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points of one item."""
+    def inside(self, index: int, position: np.ndarray, primitive: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Points of an item, (n, 3) in the world at times, (n,), in the frame of the item that it became."""
         item, other = self.before.compiled.items[index], self.after.compiled.items[self.item[index]]
-        a, b = item.shape, other.shape
-        if a is not b and hasattr(a, "vertices") and not np.array_equal(a.vertices, b.vertices):
-            raise UnsupportedError(
-                "label: a mesh is deformed under a rolling shutter; allowed: objects that move whole"
-            )
+        inside = moved_by(np.linalg.inv(places(item, times)), position)
+        if deformed(item, other):
+            return on_deformed(item.shape, other.shape, primitive, inside)  # type: ignore[arg-type]
         change = shape_motion(item, other)
-        inside = _moved(change @ np.linalg.inv(places(item, times)), position)
-        return seen_from(self.after, lambda t: _moved(places(other, t), inside), len(inside))
+        return inside @ change[:3, :3].T + change[:3, 3]
+
+    def outside(self, index: int, inside: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """The same points in the world of the other view, each at its own time."""
+        return moved_by(places(self.after.compiled.items[self.item[index]], times), inside)
 
     @property
     def pixels(self) -> np.ndarray:
@@ -170,7 +174,7 @@ def object_points(view: View, index: int, inside: np.ndarray, times: np.ndarray)
     """Points of an object, (n, 3) in its frame, in the world, each at its own time, (n,)."""
     thing = view.given.objects[index]
     poses = np.array([object_pose(frozen(thing, float(time))) for time in times])
-    return _moved(poses, inside)
+    return moved_by(poses, inside)
 
 
 class Crossings(NamedTuple):
@@ -217,6 +221,6 @@ def inside_objects(frame: Any) -> np.ndarray:
     return found
 
 
-def _moved(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
+def moved_by(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points, (n, 3), each under its own map, (n, 4, 4)."""
     return (matrices[:, :3, :3] @ points[..., None])[..., 0] + matrices[:, :3, 3]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from sightray.images import Image
-from sightray.images.png import write_png
+from sightray.images.png import png_bytes
 from sightray.lights.base import Light
 from sightray.vision.labels import Labels
 from sightray.vision.silhouettes import Outliner, Silhouette
+from sightray.vision.trajectory import Trajectory
 
+PICTURE = "picture"  # name of what the camera's own sensor delivers, among those of depth sensors
 COMPRESSION = 3  # of PNG pictures: a noisy picture gets no smaller by more
 
 
@@ -30,9 +32,15 @@ class Shot:
     camera, cameras : index and names of the cameras.
     sequence, step : which sequence of pictures it belongs to, and its place in that, from 0.
     time : seconds since the sequence began.
+    trajectory : how the first camera moves, over `time`; None if it is not known, or pictures are apart.
+    next_time : when the next picture of the sequence is taken; None for the last one.
     targets : indices, as in ``labels.objects``, of the objects that the dataset is about; None for all that are no
         lights and have an end.
     threads : for writers that cast rays of their own.
+    delivered : what a camera's `Sensor` made of the picture, (h, w, 3) or (h, w) whole numbers of `bits` bits; None
+        without a sensor.
+    measured : what depth sensors measured, (h, w) metres each, by their names.
+    devices : the sensors in words, by the same names; the camera's is "picture".
     """
 
     labels: Labels
@@ -43,8 +51,14 @@ class Shot:
     sequence: int = 0
     step: int = 0
     time: float = 0.0
+    trajectory: Trajectory | None = field(default=None, repr=False)
+    next_time: float | None = None
     targets: tuple[int, ...] | None = None
     threads: int | None = field(default=None, repr=False)
+    delivered: np.ndarray | None = field(default=None, repr=False)
+    bits: int = 8
+    measured: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
+    devices: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
     def id(self) -> int:
@@ -63,14 +77,18 @@ class Shot:
 
     @cached_property
     def png(self) -> bytes:
-        """The picture as a PNG file; black if there is none."""
+        """The picture as a PNG file of 8 bits, colours; as its sensor delivers it, if it has one; black if there is none."""
         labels = self.labels
-        codes = np.zeros((labels.height, labels.width, 3), np.uint8) if self.image is None else self.image.to_bytes()
+        if self.delivered is not None:
+            scaled = np.floor(self.delivered * (255 / (2**self.bits - 1)) + 0.5)
+            codes = scaled.astype(np.uint8).reshape(labels.height, labels.width, -1)
+        elif self.image is not None:
+            codes = self.image.to_bytes()
+        else:
+            codes = np.zeros((labels.height, labels.width, 3), np.uint8)
         if codes.shape[2] == 1:
             codes = np.repeat(codes, 3, axis=2)
-        stream = io.BytesIO()
-        write_png(stream, codes[..., :3], compression=COMPRESSION)
-        return stream.getvalue()
+        return png_bytes(codes[..., :3], compression=COMPRESSION)
 
     @cached_property
     def objects(self) -> tuple[Any, ...]:

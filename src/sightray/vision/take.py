@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sightray.scene.scene import Scene
+from sightray.vision.depth_sensors.base import DepthSensor
+from sightray.vision.sensor import Sensor
+from sightray.vision.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +27,10 @@ class Take:
     stereo : whether there are two cameras, a rectified pair.
     classes : names of classes by names of objects, for `label`; they also number the classes.
     targets : indices in ``scene.objects`` of what the dataset is about; None for all that have an end.
-    seeds : of the random numbers of each camera's picture.
+    trajectory, next_time : see `Shot`.
+    seeds : of the random numbers of each camera's picture, and of its sensors' noise.
+    sensor : what makes numbers of each picture; None for pictures as they are rendered.
+    depth_sensors : by name; each is built around each camera.
     note : more about the frame, for its mark; ready for JSON.
     """
 
@@ -41,5 +47,9 @@ class Take:
     stereo: bool = False
     classes: Mapping[str, str] | None = None
     targets: tuple[int, ...] | None = None
+    trajectory: Trajectory | None = None
+    next_time: float | None = None
     seeds: tuple[int, ...] = (0,)
+    sensor: Sensor | None = None
+    depth_sensors: Mapping[str, DepthSensor] = field(default_factory=dict)
     note: dict[str, Any] = field(default_factory=dict)

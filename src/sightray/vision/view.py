@@ -12,7 +12,7 @@ import numpy as np
 from sightray._jit import kernel
 from sightray.bvh.bvh8 import int_at
 from sightray.cameras.base import Camera, _Pinhole
-from sightray.errors import SceneError, UnsupportedError
+from sightray.errors import SceneError
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Space, Table, aligned, f64_at, i64_at, is_null, link, table_at, vec3_at
 from sightray.mathlib.transform import put_columns, transform_point
@@ -58,13 +58,6 @@ class View:
     def middle_items(self) -> list[Item]:
         """The items of that scene."""
         return self.compiled.items if self.scene is self.middle else list(flatten(self.middle))
-
-    def require_still(self) -> None:
-        """Raise an `UnsupportedError` where objects move while rows are exposed one after the other."""
-        if self.blurred:
-            raise UnsupportedError(
-                "label: objects move under a rolling shutter; layers that need poses, other views or queries cannot do that"
-            )
 
     @cached_property
     def intrinsics(self) -> np.ndarray | None:

@@ -13,7 +13,8 @@ from sightray.vision.shot import Shot
 from sightray.vision.trajectory import Keyframes, Orbit
 
 WIDTH, HEIGHT, RATE = 64, 48, 10.0
-LAYERS = ("depth", "normal", "instance", "semantic", "position", "flow", "occlusion", "out_of_view", "disparity")
+LAYERS = ("depth", "normal", "instance", "semantic", "position", "flow", "occlusion", "out_of_view", "next_position",
+          "disparity")  # fmt: skip
 K = np.array([[70.0, 0.0, 33.25], [0.0, 72.0, 22.5], [0.0, 0.0, 1.0]])
 
 
@@ -63,5 +64,6 @@ def example_shots(frames: int = 3) -> tuple[Shot, ...]:
             )  # fmt: skip
             image = sr.Image(np.where(np.isnan(labels.normal), 0.2, 0.5 + 0.5 * labels.normal))
             found.append(Shot(labels, image, frame=step, camera=index, cameras=("left", "right"), step=step,
-                              time=step / RATE, targets=(0, 1, 2)))  # fmt: skip
+                              time=step / RATE, targets=(0, 1, 2), trajectory=animation.camera,
+                              next_time=(step + 1) / RATE if step + 1 < frames else None))  # fmt: skip
     return tuple(found)

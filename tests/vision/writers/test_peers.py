@@ -151,6 +151,34 @@ def test_opencv_reads_kitti_flow_and_disparity(written):
         assert (picture == shot.image.to_bytes()).all()
 
 
+def test_pykitti_reads_the_odometry_layout(written):
+    """Its poses, times, pictures, intrinsics and baseline; it wants a laser, too, whose x is forward."""
+    data = import_module("pykitti").odometry(str(written / "kitti"), "00")
+    assert len(data) == 3
+    truth = np.array([shot.labels.world_from_camera for shot in example_shots()[::2]])
+    np.testing.assert_allclose(truth[0] @ np.array(data.poses), truth, atol=1e-12)
+    np.testing.assert_allclose([stamp.total_seconds() for stamp in data.timestamps], [0, 0.1, 0.2], atol=1e-9)
+    np.testing.assert_allclose(data.calib.K_cam2, K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]], atol=1e-12)
+    assert abs(data.calib.b_rgb - 0.1) <= 1e-9
+    np.testing.assert_allclose(data.calib.T_cam2_velo @ [1, 2, 3, 1], [-2, -3, 1, 1], atol=1e-12)
+    for step in range(3):
+        for shot, picture in zip(example_shots()[2 * step :], data.get_rgb(step), strict=False):
+            assert (np.asarray(picture) == shot.image.to_bytes()).all()
+
+
+def test_opencv_reads_kitti_2015(written):
+    cv2 = import_module("cv2")
+    folder, labels = written / "kitti2015/training", example_shots()[0].labels
+    for path in sorted((folder / "flow_occ").glob("*_10.png")):
+        assert (folder / f"image_2/{path.name.replace('_10', '_11')}").is_file()
+    bgr = cv2.imread(str(folder / "flow_occ/000000_10.png"), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    flow, valid = (bgr[..., 2:0:-1].astype(float) - 2**15) / 64, bgr[..., 0] == 1
+    assert np.abs(flow - labels.flow)[valid].max() <= 0.5 / 64 + 1e-12
+    codes = cv2.imread(str(folder / "disp_occ_0/000000_10.png"), cv2.IMREAD_UNCHANGED)
+    assert codes.dtype == np.uint16
+    assert np.abs(codes / 256 - labels.disparity)[codes > 0].max() <= 0.5 / 256 + 1e-12
+
+
 def test_evo_reads_kitti_tum_and_euroc_poses(written):
     files = import_module("evo.tools.file_interface")
     truth = np.array([shot.labels.world_from_camera for shot in example_shots()[::2]])

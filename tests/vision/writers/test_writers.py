@@ -8,13 +8,13 @@ from __future__ import annotations
 import io
 import json
 import struct
-import zlib
 
 import numpy as np
 import pytest
 import yaml
-from example_shots import HEIGHT, RATE, WIDTH, K, block, example_scene, example_shots
+from example_shots import HEIGHT, RATE, WIDTH, K, block, example_scene, example_shots, moving
 from PIL import Image
+from reading import read_png
 
 import sightray as sr
 from sightray.errors import SceneError
@@ -35,33 +35,13 @@ def shot_of(step: int, camera: int = 0) -> Shot:
     return example_shots()[2 * step + camera]
 
 
-def read_png(data: bytes) -> np.ndarray:
-    """8- or 16-bit PNG by its own rules: rows are bytes after a filter of kind 0 or 2 (others are refused)."""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    at, parts = 8, b""
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at : at + 8])
-        body = data[at + 8 : at + 8 + length]
-        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(kind + body)
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", body[:10])
-        parts += body if kind == b"IDAT" else b""
-        at += 12 + length
-    channels = {0: 1, 2: 3}[colour]
-    rows = np.frombuffer(zlib.decompress(parts), np.uint8).reshape(height, -1)
-    assert set(rows[:, 0]) <= {2}
-    bytes_ = np.cumsum(rows[:, 1:], axis=0, dtype=np.uint8)
-    values = bytes_.reshape(height, width, channels, depth // 8)
-    return values[..., 0].astype(int) * 256 + values[..., 1]
-
-
 def test_every_writer_states_its_conventions():
     for label, cls in known_writers().items():
         doc = " ".join((cls.__doc__ or "").split())
         assert "(0.5, 0.5)" in doc or "(0, 0)" in doc, label
         assert cls.summary().startswith(("Poses", "One", *"ABCDEFGHIJKLMNOPQRSTUVWXYZ")), label
-    assert sorted(known_writers()) == ["bop", "coco", "colmap", "euroc", "exr", "hdf5", "kitti", "middlebury",
-                                       "transforms", "tum"]  # fmt: skip
+    assert sorted(known_writers()) == ["bop", "coco", "colmap", "euroc", "exr", "hdf5", "kitti", "kitti2015", "middlebury",
+                                       "sensors", "transforms", "tum"]  # fmt: skip
 
 
 def test_unknown_format_offers_the_nearest():
@@ -237,7 +217,7 @@ def test_euroc_states_and_sensors(written):
         assert row[0] == step * 100_000_000
         np.testing.assert_allclose(row[1:4], pose[:3, 3], atol=1e-14)
         np.testing.assert_allclose(rotation(*row[4:8]), pose[:3, :3], atol=1e-14)
-    np.testing.assert_allclose(rows[1, 8:11], (rows[2, 1:4] - rows[0, 1:4]) / 0.2, atol=1e-12)
+        np.testing.assert_allclose(row[8:11], moving(example_scene()).camera.velocity(step / RATE), atol=1e-7)
     assert (rows[:, 11:] == 0).all()
     right = yaml.safe_load((folder / "cam1/sensor.yaml").read_text())
     np.testing.assert_allclose(np.reshape(right["T_BS"]["data"], (4, 4))[:3, 3], [0.1, 0, 0], atol=1e-12)
@@ -431,7 +411,7 @@ def test_pictures_without_flow_or_disparity_are_no_middlebury():
         as_writer("middlebury").accept(shot)
 
 
-@pytest.mark.parametrize("label", ["bop", "kitti", "tum", "euroc", "colmap", "transforms"])
+@pytest.mark.parametrize("label", ["bop", "kitti", "kitti2015", "tum", "euroc", "colmap", "transforms"])
 def test_cameras_that_a_format_cannot_state_are_refused(label):
     labels = sr.label(
         example_scene(), "depth", "instance", camera=sr.PanoramaCamera(eye=(0, 1, 3), width=32, height=16)

@@ -14,6 +14,7 @@ from sightray.mathlib.vec import Vec3
 from sightray.scene.query_kernels import put_triple
 from sightray.vision.layers.base import Layer, fill
 from sightray.vision.record import DIRECTION, NEXT, ORIGIN, PIXEL, POINT, PREVIOUS, is_met, record_at
+from sightray.vision.rolling import FOLLOWED
 from sightray.vision.view import FAR, is_gone, moved_point
 
 
@@ -29,7 +30,7 @@ class _OtherPosition(Layer):
 
     def needs(self, frame: Any) -> tuple[str, ...]:
         if frame.rolls(self.toward):
-            return ("ray_origin", "ray_direction", "position", "item")
+            return FOLLOWED
         frame.motion(self.toward)
         return ()
 

@@ -10,14 +10,14 @@ from sightray.mathlib.table import Table, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3
 from sightray.scene.query_kernels import put_triple
 from sightray.vision.layers.base import Layer, fill
-from sightray.vision.record import NORMAL, PIXEL, SURFACE, is_met, record_at
+from sightray.vision.record import FACE, NORMAL, PIXEL, is_met, record_at
 
 
 class NormalLayer(Layer):
     """Geometric normal of the surface that is seen: unit length, pointing outward, in the world."""
 
     label, frame, columns, picture, letters = "normal", "world", 3, "direction", "XYZ"
-    detail = SURFACE
+    detail = FACE
 
 
 @implements(fill, NormalLayer)

@@ -11,7 +11,7 @@ from sightray.mathlib.transform import transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.scene.query_kernels import put_triple
 from sightray.vision.layers.base import Layer, fill
-from sightray.vision.record import CAMERA_FROM_WORLD, NORMAL, PIXEL, SURFACE, is_met, record_at
+from sightray.vision.record import CAMERA_FROM_WORLD, FACE, NORMAL, PIXEL, is_met, record_at
 
 
 class NormalCameraLayer(Layer):
@@ -20,7 +20,7 @@ class NormalCameraLayer(Layer):
     """
 
     label, frame, columns, picture, letters = "normal_camera", "camera", 3, "direction", "XYZ"
-    detail = SURFACE
+    detail = FACE
 
 
 @implements(fill, NormalCameraLayer)

@@ -21,17 +21,22 @@ class _Occlusion(Layer):
         return (self.flow_layer, f"{self.toward}_position")
 
     def compute(self, frame: Any) -> np.ndarray:
-        other = frame.other(self.toward)
         points = frame.values[f"{self.toward}_position"].reshape(-1, 3)
         y, x = np.indices((frame.height, frame.width))
         pixels = (frame.values[self.flow_layer] + np.stack([x, y], axis=-1) + 0.5).reshape(-1, 2)
-        within = other.within(pixels)
-        hidden = np.zeros(len(points), bool)
-        if other.blurred:
-            hidden[within] = ~clear_sight(frame.beside(self.toward), points[within], pixels[within])
-        else:
-            hidden[within] = ~other.sees(points[within], pixels[within], frame.threads)
-        return hidden.reshape(frame.height, frame.width)
+        return hidden_from(frame, self.toward, points, pixels).reshape(frame.height, frame.width)
+
+
+def hidden_from(frame: Any, name: str, points: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Whether points, (n, 3), that another view has at pixel coordinates within its picture are hidden there: (n,) bool."""
+    other = frame.other(name)
+    within = other.within(pixels)
+    hidden = np.zeros(len(points), bool)
+    if other.blurred:
+        hidden[within] = ~clear_sight(frame.beside(name), points[within], pixels[within])
+    else:
+        hidden[within] = ~other.sees(points[within], pixels[within], frame.threads)
+    return hidden
 
 
 class OcclusionLayer(_Occlusion):

@@ -21,7 +21,7 @@ class RefractedFlowLayer(Layer):
     label, unit, frame, columns, picture, letters = "refracted_flow", "pixels", "pixel", 2, "flow", "XY"
 
     def needs(self, frame: Any) -> tuple[str, ...]:
-        frame.motion("next")
+        frame.other("next")
         return ()
 
     def compute(self, frame: Any) -> np.ndarray:

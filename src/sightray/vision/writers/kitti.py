@@ -13,6 +13,7 @@ from sightray.vision.shot import Shot
 from sightray.vision.writers.base import Note, Output, Writer, sequences
 
 FLOW_STEPS, FLOW_ZERO, DISPARITY_STEPS, MOST = 64.0, 2.0**15, 256.0, 2.0**16 - 1
+LASER = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0]])  # x forward, y left, z up
 FIRST = 2  # KITTI's cameras 0 and 1 are grey, the left one in colour is 2
 
 
@@ -23,12 +24,14 @@ class KittiWriter(Writer):
     - ``poses/SS.txt``: a line of 12 numbers per picture, the upper 3 x 4 of the first camera's pose in the frame of its
       first picture, metres; axes are OpenCV's: +x right, +y down, +z forward.
     - ``calib.txt``: P0 ... P3, 3 x 4 projections from the first camera's frame. The centre of the top-left pixel is (0, 0)
-      there: 0.5 is subtracted from cx and cy. P0 and P1 repeat P2 and P3.
+      there: 0.5 is subtracted from cx and cy. P0 and P1 repeat P2 and P3. ``Tr`` is the pose in that frame of a laser at the
+      first camera, x forward, y left, z up: there is none, but readers want to know.
     - ``flow_occ``, ``flow_noc``: 16-bit PNG to the next picture, u 64 + 2¹⁵, v 64 + 2¹⁵, valid; pixels to the right and
       down. Valid is 0 where |u| or |v| is beyond 512 pixels, and what is hidden or beyond the border in ``noc``.
     - ``disp_occ_0``: 16-bit PNG, 256 d; 0 where there is none or d is not above 0, as at infinity. Of the left camera.
 
-    The folders of flow and disparity, which KITTI keeps in another benchmark, stand beside the pictures.
+    The folders of flow and disparity, which KITTI keeps in another benchmark, stand beside the pictures; `kitti2015` has
+    that benchmark's own layout.
     """
 
     label: ClassVar[str] = "kitti"
@@ -87,7 +90,8 @@ def _calibration(notes: list[Note]) -> str:
     first = np.array(notes[0]["world_from_camera"])
     matrices = [np.array(n["K"]) @ (np.linalg.inv(n["world_from_camera"]) @ first)[:3] for n in notes]
     lines = [f"P{k}: {_line(matrix)}" for k, matrix in enumerate(matrices[:FIRST])]
-    return "".join(lines + [f"P{FIRST + k}: {_line(matrix)}" for k, matrix in enumerate(matrices)])
+    lines += [f"P{FIRST + k}: {_line(matrix)}" for k, matrix in enumerate(matrices)]
+    return "".join([*lines, f"Tr: {_line(LASER)}"])
 
 
 def _line(matrix: np.ndarray) -> str:

@@ -1,0 +1,1 @@
+"""Depth sensors: each one file, named after how it measures."""

@@ -121,18 +121,36 @@ def test_absorption_alone_obeys_beer():
     np.testing.assert_allclose(image[0, 0], np.exp(-np.array([0.2, 0.7, 2]) / 0.8), rtol=1e-6)
 
 
+@pytest.mark.parametrize("eye", [(0, 0, 2.5), (0.2, 0.1, 0.3)])
 @pytest.mark.parametrize("g", [0.0, 0.8])
 @pytest.mark.parametrize("scattering", [2.0, (1, 2, 3)])
-def test_furnace_in_a_medium_that_only_scatters(g, scattering):
+def test_furnace_in_a_medium_that_only_scatters(g, scattering, eye):
     """Radiance 1 from all around is radiance 1 everywhere within: a cloud in an even sky cannot be seen."""
     medium = sr.HomogeneousMedium(scattering=scattering, g=g)
     cloud = sr.Sphere(material=sr.Boundary(interior=medium))
-    camera = sr.PerspectiveCamera(eye=(0, 0, 2.5), vfov=50, width=8, height=8)
+    camera = sr.PerspectiveCamera(eye=eye, vfov=50, width=8, height=8)
     scene = sr.Scene(cloud, camera=camera, background=1)
     runs = np.array([np.asarray(sr.render(scene, sr.PathTracer(), samples=32, seed=k)).mean((0, 1)) for k in RUNS])
     error = runs.std(0, ddof=1) / math.sqrt(len(RUNS))
     assert (np.abs(runs.mean(0) - 1) < 4 * error + 1e-6).all()
     assert (error < 0.03).all()
+
+
+def test_an_eye_within_a_cloud_sees_it():
+    """A body of fog that fills a room is the same as a room full of fog, for an eye inside, too."""
+    camera = sr.PerspectiveCamera(eye=(-0.5, 0.1, 0.3), target=(0.3, 0, 0), vfov=60, width=8, height=8)
+    fog = sr.HomogeneousMedium(scattering=(1.5, 1.0, 0.5), absorption=0.5, g=0.4)
+    room = sr.Sphere(material=sr.Lambert(albedo=0.6)), sr.PointLight(position=(0.4, 0, 0), intensity=1)
+    body = sr.Sphere(radius=1 - 1e-6, material=sr.Boundary(interior=fog))
+
+    def runs(scene):
+        tracer = sr.PathTracer(max_depth=12)
+        return np.array([np.asarray(sr.render(scene, tracer, samples=32, seed=k)).mean((0, 1)) for k in RUNS])
+
+    a, b = runs(sr.Scene(*room, camera=camera, medium=fog)), runs(sr.Scene(*room, body, camera=camera))
+    error = np.sqrt((a.var(0, ddof=1) + b.var(0, ddof=1)) / len(RUNS))
+    assert (np.abs(a.mean(0) - b.mean(0)) < 4 * error).all()
+    assert (error < 0.05 * a.mean(0)).all()
 
 
 def test_furnace_full_of_fog():

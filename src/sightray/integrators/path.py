@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from sightray._jit import implements, kernel
-from sightray.accelerators.item import CLEAR, ItemHit
+from sightray.accelerators.item import CLEAR, THIN, ItemHit
 from sightray.cameras.base import Ray
 from sightray.fields import derived_array, flag, integer
 from sightray.fields import number as real
@@ -28,7 +28,7 @@ from sightray.mathlib.bands import BANDS_WORDS, ones
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table, scratch, table_at
 from sightray.mathlib.vec import Vec3, grey, max4
-from sightray.media.base import sample_distance, sample_phase, transmittance
+from sightray.media.base import sample_distance, sample_phase
 from sightray.samplers.base import Draws, nested, number, one_of, pair
 from sightray.scene.world import Beam, Point, find_closest, light_count, on_seen_side, point_of, sight_beam
 from sightray.spectra.upsampling import band_table
@@ -162,6 +162,9 @@ def walk(integrator: Table, world: Table, first: Step, draws: Draws, pause: i64)
             color += limited(integrator, beta * behind, turns)
             break
         point = on_seen_side(point_of(world, hit, o, d, beam), d)
+        if nest.depth == 0 and point.cos_view < 0.0 and is_null(nest.here) and is_filled(point):
+            nest = crossing(world, nest, point, -d)  # the eye is inside of a body: look again, through what fills it
+            continue
         if event <= pause and point.flags & CLEAR == 0 and is_null(nest.here) and is_matte(point):
             here = Step(o, d, beta, nest, beam, start, n, density, gone, t_min, depth, turns, event - 1)
             return Walked(color, rays - 1, event - 1, hit, here)
@@ -171,8 +174,6 @@ def walk(integrator: Table, world: Table, first: Step, draws: Draws, pause: i64)
             nest = crossing(world, nest, point, d)
             o = point.p
             continue
-        if point.cos_view < 0.0 and nest.depth == 0:
-            beta = beta * darkened(point, o, d, hit.t, bands, own)
         color += limited(integrator, beta * given_off(world, point, start, n, d, gone, density, bands), turns)
         if depth >= i64_at(integrator, DEPTH):
             break
@@ -208,6 +209,12 @@ def walk(integrator: Table, world: Table, first: Step, draws: Draws, pause: i64)
 
 
 @kernel
+def is_filled(point: Point) -> bool:
+    """Whether a medium is behind a surface."""
+    return point.flags & THIN == 0 and not is_null(interior(point.material))
+
+
+@kernel
 def given_off(world: Table, point: Point, start: Vec3, n: Vec3, d: Vec3, gone: f64, density: f64, bands: Table) -> Vec3:
     """Light that a surface gives off itself, weighed as `chance_weight` does: looking for lights finds it, too."""
     glow = glow_in(bands, point.material, emitted(point.material, point.where, point.cos_view))
@@ -231,15 +238,6 @@ def survival(integrator: Table, beta: Vec3, event: i64) -> f64:
     if event <= i64_at(integrator, ROULETTE_DEPTH):
         return 1.0
     return min(max4(beta), 1.0)
-
-
-@kernel
-def darkened(point: Point, o: Vec3, d: Vec3, t: f64, bands: Table, own: Draws) -> Vec3:
-    """What is left of light that came from within a body which the path has not entered: the eye is inside of it."""
-    inside = interior(point.material)
-    if is_null(inside):
-        return grey(1.0)
-    return transmittance(inside, o, d, t, bands, nested(own, MEDIUM))
 
 
 @kernel

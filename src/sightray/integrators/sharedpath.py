@@ -19,7 +19,6 @@ from sightray.integrators.path import (
     WAY,
     PathTracer,
     Step,
-    darkened,
     from_eye,
     given_off,
     limited,
@@ -103,7 +102,6 @@ class Turn(NamedTuple):
     wo: Vec3
     own: Draws
     t_min: f64
-    beta: Vec3  # path throughput here
     glow: Vec3  # what the surface gives off itself, weighed
     chosen: BsdfSample
     choice: f64  # number that decides whether the walk goes on
@@ -140,9 +138,6 @@ def turn_at(world: Table, hit: ItemHit, at: Step, draws: Draws) -> Turn:
     frame = frame_of(x)
     wo = into(frame, -at.d)
     own = nested(draws, at.event)
-    beta = at.beta
-    if x.cos_view < 0.0 and at.nest.depth == 0:
-        beta = beta * darkened(x, at.o, at.d, hit.t, at.beam.bands, own)
     light = given_off(world, x, at.start, at.n, at.d, at.gone + hit.t, at.density, at.beam.bands)
     way, choice = pair(own, WAY), pair(own, CHOICE)
     chosen = sample_bsdf(x.material, x.where, wo, way.u, way.v, choice.u)
@@ -152,7 +147,7 @@ def turn_at(world: Table, hit: ItemHit, at: Step, draws: Draws) -> Turn:
     bend = d - straight
     direct = chosen.density > 0.0 and not passes and not dot(bend, bend) > 0.0
     t_min = first_step(math.nan, x.p, hit.t)
-    return Turn(x, frame, wo, own, t_min, beta, light, chosen, choice.v, d, direct)
+    return Turn(x, frame, wo, own, t_min, light, chosen, choice.v, d, direct)
 
 
 @kernel
@@ -181,7 +176,7 @@ def follow(integrator: Table, world: Table, sight: Table, first: Table, second: 
     # At x, look for a light; then go on from there.
     at, rays, color = seen.step, seen.rays + 1, seen.color
     x = turn_at(world, seen.hit, at, draws)
-    color += limited(integrator, x.beta * x.glow, at.turns)
+    color += limited(integrator, at.beta * x.glow, at.turns)
     if at.depth >= i64_at(integrator, DEPTH):
         vec3_put(sight, COLOR, color)
         return rays
@@ -191,8 +186,8 @@ def follow(integrator: Table, world: Table, sight: Table, first: Table, second: 
             own = one_of(x.own, k, lights)
             found = direct_light(world, x.point, lit_from, x.frame, x.wo, x.t_min, at.nest, no_table(), own)
             rays += found.rays
-            color += limited(integrator, x.beta * found.color, at.turns + 1) * (1.0 / lights)
-    weight = x.beta * x.chosen.weight
+            color += limited(integrator, at.beta * found.color, at.turns + 1) * (1.0 / lights)
+    weight = at.beta * x.chosen.weight
     if is_null(at.nest.here) and at.nest.depth == 0:
         note_surface(first, x.point, x.frame, at, x.t_min)
         note_first(first, x, at, seen.hit)
@@ -221,7 +216,7 @@ def go_on(
     rays = met.rays
     if met.hit.item >= 0:
         y = turn_at(world, met.hit, met.step, draws)
-        if not is_narrow(y.point) and not max4(step.beta - y.beta) > 0.0:
+        if not is_narrow(y.point):
             return at_matte(integrator, world, met.hit, met.step, y, weight, enough, draws, second)
         met = walk(integrator, world, step, draws, 0)
         rays += met.rays
@@ -317,7 +312,7 @@ def note_first(row: Table, x: Turn, at: Step, hit: ItemHit) -> None:
     i64_put(row, BOUNCES, at.depth)
     i64_put(row, TURNS, at.turns)
     vec3_put(row, VIEWER, x.wo)
-    vec3_put(row, BETA, x.beta)
+    vec3_put(row, BETA, at.beta)
     vec3_put(row, LIT_NORMAL, lit_normal(x.point))
     f64_put(row, BEAM_WIDTH, at.beam.width + at.beam.spread * hit.t)
     f64_put(row, BEAM_SPREAD, at.beam.spread)

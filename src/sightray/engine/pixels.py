@@ -28,6 +28,7 @@ from sightray.samplers.base import Draws, Pair, begin, nested, number, pair
 from sightray.scene.world import CAMERA
 
 MOST = 1 << 62
+WIDEST = 2  # most pixels from one of a lattice to the next: neighbours are more alike, but wider ones make no squares
 # Dimensions of a sample's draws that the engine takes; integrators have draws of their own.
 PLACE, LENS, TIME = 0, 1, 2
 
@@ -94,14 +95,25 @@ def render_tile(
     return rays
 
 
+class Lattice(NamedTuple):
+    """Pixels whose rays go together."""
+
+    x: i64  # the first of them
+    y: i64
+    across: i64  # from one to the next
+    down: i64
+    together: i64  # to a side
+
+
 @kernel
 def render_tile_in_groups(
     world: Table, integrator: Table, sampler: Table, film: Table, filters: Table, target: Table, stop: Table,
     x0: i64, y0: i64, x1: i64, y1: i64, width: i64, expected: i64, centred: i64, seed: i64, together: i64,
 ) -> i64:  # fmt: skip
-    """The same, for integrators that want the rays of neighbouring pixels: squares with a side of `together` pixels.
+    """The same, for integrators that want the rays of near pixels: square lattices of `together` by `together` of them.
 
-    The squares lie elsewhere for each sample, so that none shows in the picture; at the edges of the tile they are cut.
+    The lattices lie elsewhere for each sample and are as wide as chance will have it, so that none shows in the picture;
+    at the edges of the tile they are cut.
     """
     rays = 0
     first, last = MOST, 0
@@ -110,31 +122,37 @@ def render_tile_in_groups(
             first = min(first, samples_taken(film, y * width + x))
             last = max(last, i64(i32_at(target, y * width + x)))
     for s in range(first, last):
-        shift = word(stream(seed, s), 0) & LOW
-        top = y0 - shift % together
+        lattice = word(stream(seed, s), 0) & LOW
+        across, down = 1 + (lattice & 255) % WIDEST, 1 + (lattice >> 8 & 255) % WIDEST
+        top = y0 - (lattice >> 16 & 255) % (together * down)
         while top < y1:
-            left = x0 - (shift >> 16) % together
+            left = x0 - (lattice >> 24) % (together * across)
             while left < x1:
-                if i64_at(stop, 0) != 0:
-                    return rays
-                rays += render_group(
-                    world, integrator, sampler, film, filters, target, max(left, x0), max(top, y0),
-                    min(left + together, x1), min(top + together, y1), width, s, expected, centred, seed,
-                )  # fmt: skip
-                left += together
-            top += together
+                for k in range(across * down):
+                    if i64_at(stop, 0) != 0:
+                        return rays
+                    here = Lattice(left + k % across, top + k // across, across, down, together)
+                    rays += render_group(
+                        world, integrator, sampler, film, filters, target, here, x0, y0, x1, y1, width, s, expected,
+                        centred, seed,
+                    )  # fmt: skip
+                left += together * across
+            top += together * down
     return rays
 
 
 @kernel
 def render_group(
-    world: Table, integrator: Table, sampler: Table, film: Table, filters: Table, target: Table,
+    world: Table, integrator: Table, sampler: Table, film: Table, filters: Table, target: Table, lattice: Lattice,
     x0: i64, y0: i64, x1: i64, y1: i64, width: i64, s: i64, expected: i64, centred: i64, seed: i64,
 ) -> i64:  # fmt: skip
-    """Take sample s of those pixels of a rectangle that are to have it and have it not; returns the number of rays."""
+    """Take sample s of those pixels of a lattice within the tile that are to have it and have it not; how many rays."""
     sights, count = scratch(1536), 0  # 64 rays
-    for y in range(y0, y1):
-        for x in range(x0, x1):
+    for j in range(lattice.together):
+        for i in range(lattice.together):
+            x, y = lattice.x + i * lattice.across, lattice.y + j * lattice.down
+            if x < x0 or x >= x1 or y < y0 or y >= y1:
+                continue
             pixel = y * width + x
             if samples_taken(film, pixel) != s or s >= i64(i32_at(target, pixel)):
                 continue

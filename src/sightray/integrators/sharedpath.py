@@ -64,8 +64,9 @@ class SharedPathTracer(PathTracer):
     the same random numbers, where that led to a light: so caustics are shared, too (random replay: D. Lin et al.,
     "Generalized resampled importance sampling", SIGGRAPH 2022).
 
-    The squares lie elsewhere for each sample. Noise of neighbouring pixels is alike, which denoisers do not expect.
-    Pixels whose rays have different times (shutters) or wavelengths (`spectral`), or are in a medium, share nothing.
+    The squares, or lattices of every second pixel, lie elsewhere for each sample. Noise of neighbouring pixels is alike,
+    which denoisers do not expect. Pixels whose rays have different times (shutters) or wavelengths (`spectral`), or are in
+    a medium, share nothing.
     """
 
     share: int = integer(

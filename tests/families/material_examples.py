@@ -44,7 +44,8 @@ EXAMPLES = {
         sr.Principled(transmission=0.7, metallic=0.2, roughness=0.6, thin_walled=True),
         sr.Principled(clearcoat=1, clearcoat_roughness=0.5, sheen=(0.9, 0.2, 0.4), sheen_roughness=0.4, roughness=0.8),
         sr.Principled(roughness=0.1, metallic=0.5, clearcoat=0.5),
-        sr.Principled(base_color=(0.8, 0.3, 0.1), roughness=0.7, metallic=0.6, transmission=0.5, anisotropy=0.8),
+        sr.Principled(base_color=(0.8, 0.3, 0.1), roughness=0.7, metallic=0.6, transmission=0.5, anisotropy=0.8,
+                      anisotropy_rotation=35),
     ],
     "Mix": [
         sr.Mix(a=sr.Lambert(albedo=0), b=sr.Conductor(roughness=0.6), amount=0.3),

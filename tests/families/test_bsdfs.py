@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -329,11 +330,16 @@ LINES = np.array([450.0, 550.0, 620.0, 700.0])
 @pytest.mark.parametrize(("material", "noise"), [
     (sr.Glass(ior="diamond"), 0.02),
     (sr.RoughGlass(ior="N-SF10", roughness=0.3), 0.03),
+    (sr.Principled(base_color=1, transmission=1, roughness=0.3, ior=1.728, dispersion=0.9), 0.03),
 ])  # fmt: skip
 def test_dispersive_glass_is_unbiased_in_every_wavelength(material, noise):
     """Over the four choices of hero, each wavelength is reflected by its own Fresnel share, and the rest passes."""
     angle = math.radians(40)
-    wo, index = np.array([math.sin(angle), 0, math.cos(angle)]), sr.spectra.refractive_index(material.ior)
+    wo = np.array([math.sin(angle), 0, math.cos(angle)])
+    if isinstance(material.ior, str):
+        index = sr.spectra.refractive_index(material.ior).at
+    else:
+        index = functools.partial(np.interp, xp=sr.spectra.WAVELENGTHS, fp=material.indices())
     up, down = np.zeros(4), np.zeros(4)
     for hero in range(4):
         out = asked_in_bands(material, np.roll(LINES, -hero), wo, 20_000)
@@ -345,9 +351,9 @@ def test_dispersive_glass_is_unbiased_in_every_wavelength(material, noise):
         assert (out[lost, 5:8] == 0).all()
         assert (out[above, 13] == 0).all()  # reflected light has all of them
         if type(material) is sr.Glass:
-            expected = math.sin(angle) / index.at(LINES[hero])
+            expected = math.sin(angle) / index(LINES[hero])
             np.testing.assert_allclose(-out[lost, 0], expected, rtol=1e-4)  # tables hold whole nanometres
-    shares = [fresnel(math.cos(angle), 1 / n) for n in index.at(LINES)]
+    shares = [fresnel(math.cos(angle), 1 / n) for n in index(LINES)]
     np.testing.assert_allclose(up, shares, atol=noise)
     np.testing.assert_allclose(up + down, 1, atol=noise)
 
@@ -370,6 +376,39 @@ def test_metals_reflect_each_wavelength_by_its_own_index():
     np.testing.assert_allclose(smooth[0, 4:8], expected, rtol=1e-9)
     stated = asked_in_bands(sr.Conductor(eta=1.5, k=4), LINES, VIEWERS["side"], 1)
     np.testing.assert_allclose(stated[0, 4:8], fresnel_metal(0.8, 1.5, 4.0), rtol=1e-9)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_principled_glass_reflects_each_wavelength_by_its_own_index(side):
+    """From outside and from inside; so smooth that hardly any light bounces between facets."""
+    material = sr.Principled(base_color=1, transmission=1, roughness=0.1, ior=1.5, dispersion=5)
+    wo = np.array([0.5, 0.0, side * math.sqrt(0.75)])
+    out = asked_in_bands(material, LINES, wo, 20_000)
+    mirrored = out[(out[:, 2] * side > 0) & (out[:, 12] > 0)][:200]
+    assert len(mirrored) > 100
+    m = wo + mirrored[:, :3]
+    cosines = (m @ wo) / np.linalg.norm(m, axis=1)
+    indices = np.interp(LINES, sr.spectra.WAVELENGTHS, material.indices())
+    shares = np.array([[fresnel(c, 1 / n if side > 0 else n) for n in indices] for c in cosines])
+    assert (np.ptp(shares, axis=1) > 0.1 * shares.max(axis=1)).mean() > 0.9
+    np.testing.assert_allclose(mirrored[:, 8:12] / mirrored[:, 8:9], shares / shares[:, :1], rtol=0.02)
+
+
+def test_a_turned_grain_is_the_same_grain_seen_by_turned_viewers():
+    """And at right angles its highlights are long where they were short."""
+    angle = math.radians(25)
+    turn = np.array([[math.cos(angle), math.sin(angle), 0], [-math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+    straight = sr.Principled(metallic=1, roughness=0.4, anisotropy=0.9)
+    wo = np.array([0.3, -0.5, math.sqrt(1 - 0.34)])
+    out = asked_in_bands(straight.replace(anisotropy_rotation=25), LINES, wo, 200)
+    same = asked_in_bands(straight, LINES, turn @ wo, 200)
+    np.testing.assert_allclose(out[:, :3] @ turn.T, same[:, :3], atol=1e-12)
+    np.testing.assert_allclose(out[:, 8:13], same[:, 8:13], rtol=1e-9)
+    head_on = np.array([0.0, 0.0, 1.0])
+    along, across = (asked_in_bands(straight.replace(anisotropy_rotation=a), LINES, head_on, 4000)[:, :2].std(0)
+                     for a in (0, 90))  # fmt: skip
+    assert along[0] > 2 * along[1]
+    np.testing.assert_allclose(along, across[::-1], rtol=0.05)
 
 
 def test_values_that_lights_are_looked_up_with_do_not_mark_the_path():

@@ -167,3 +167,36 @@ def test_a_chessboard_to_the_horizon_has_no_moire():
     assert np.sqrt(np.mean((aliased - converged)[far] ** 2)) > 0.4
     patches = filtered[far].reshape(5, 10, 10).mean(axis=(0, 2))
     assert np.abs(patches - 0.5).max() < 0.02
+
+
+# --- gradients -----------------------------------------------------------------------------------------------------
+
+STOPS = {"colors": [[0.1] * 3, [0.9] * 3, [0.3] * 3, [0.3] * 3, [1.0] * 3], "places": [0.0, 0.2, 0.45, 0.45, 0.8]}
+
+
+@pytest.mark.parametrize("wrap", ["clamp", "repeat", "mirror"])
+@pytest.mark.parametrize("along", ["u", "v", "z"])
+@pytest.mark.parametrize("width", [0.01, 0.3, 1.0, 2.7, 20.0])
+def test_a_gradient_is_the_mean_over_a_box(along, wrap, width):
+    gradient = sr.Gradient(**STOPS, along=along, wrap=wrap, begin=0.5, end=-1.5)
+    offsets = ((np.arange(40_000) + 0.5) / 40_000 - 0.5) * width
+    for x in (*RNG.uniform(-9, 9, 6), 0.4, 0.5):
+        uv, p = np.full((len(offsets), 2), x + offsets[:, None]), np.outer(x + offsets, (0.0, 0.0, 1.0))
+        seen = reds(gradient, uv=(x, x), p=(0, 0, x), width=width / BOX, reach=width / BOX)[0]
+        assert abs(seen - reds(gradient, uv=uv, p=p).mean()) < 2e-4
+
+
+def test_a_gradient_across_the_surface_is_sharp():
+    """What runs along the normal does not change within the surface, however wide the footprint is."""
+    gradient, p = sr.Gradient(**STOPS, along="y"), np.array([[0, y, 0] for y in np.linspace(-0.2, 1.2, 50)])
+    np.testing.assert_allclose(reds(gradient, p=p, reach=5.0), reds(gradient, p=p), atol=1e-12)
+    assert np.ptp(reds(gradient, p=p, reach=100.0, normal=(1.0, 0.0, 0.0))) < 0.05
+
+
+@pytest.mark.parametrize(("wrap", "mean"), [("repeat", None), ("mirror", None), ("clamp", 0.55)])
+def test_far_gradients_are_their_mean(wrap, mean):
+    gradient = sr.Gradient(**STOPS, wrap=wrap)
+    if mean is None:
+        mean = reds(gradient, uv=np.column_stack([(np.arange(10_000) + 0.5) / 10_000] * 2)).mean()
+    far = reds(gradient, uv=RNG.uniform(-50, 50, (100, 2)), width=np.inf)
+    np.testing.assert_allclose(far, mean, atol=0.06 if wrap == "clamp" else 1e-3)

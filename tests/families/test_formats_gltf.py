@@ -9,9 +9,11 @@ import pytest
 import trimesh
 from format_examples import assert_same, image_with_a_light_top_left, points, shapes
 
+import sightray as sr
 from sightray.errors import FormatError, UnsupportedError
 from sightray.formats import load_scene
 from sightray.materials.cutout import Cutout
+from sightray.materials.microfacet import GGX, facets
 from sightray.materials.normal_map import NormalMap
 from sightray.materials.principled import Principled
 from sightray.scene.instance import Instance
@@ -134,6 +136,24 @@ def test_gltf_materials(write):
     assert (pane.transmission, pane.thin_walled) == ((0.5,) * 3, True)
     assert (cloth.sheen, cloth.sheen_roughness, cloth.specular) == ((1, 0, 0), (0.7,) * 3, (0.5,) * 3)
     assert (cloth.clearcoat, cloth.clearcoat_roughness) == ((0.8,) * 3, (0.2,) * 3)
+
+
+@pytest.mark.parametrize(("roughness", "strength"), [(0.5, 0.6), (0.9, 0.3), (0.3, 0.2)])
+def test_gltf_anisotropy_has_the_alphas_that_the_extension_states(write, roughness, strength):
+    (brushed,) = materials_of(write, {"pbrMetallicRoughness": {"roughnessFactor": roughness}, **extensions(
+        anisotropy={"anisotropyStrength": strength, "anisotropyRotation": math.pi / 3})})  # fmt: skip
+    shape = facets(GGX, brushed.roughness[0], brushed.anisotropy)
+    assert shape.y == pytest.approx(roughness**2, rel=1e-6)
+    assert shape.x == pytest.approx(roughness**2 + (1 - roughness**2) * strength**2, rel=1e-6)
+    assert brushed.anisotropy_rotation == pytest.approx(60)
+
+
+def test_gltf_dispersion(write):
+    (prism,) = materials_of(write, extensions(
+        transmission={"transmissionFactor": 1}, volume={"thicknessFactor": 1}, dispersion={"dispersion": 0.36}))  # fmt: skip
+    f, d, c = np.interp((486.13, 587.56, 656.27), sr.spectra.WAVELENGTHS, prism.indices())
+    assert d == pytest.approx(1.5, abs=1e-6)
+    assert (d - 1) / (f - c) == pytest.approx(20 / 0.36, rel=1e-3)
 
 
 def test_gltf_textures_go_where_they_belong(write, tmp_path):

@@ -10,7 +10,8 @@ import pytest
 import sightray as sr
 from sightray._jit import kernel, native
 from sightray.errors import SceneError
-from sightray.materials.base import bent_normal, emitted, interior, opacity
+from sightray.materials.base import Way, bent_normal, emitted, interior, opacity
+from sightray.materials.stored import stored
 from sightray.materials.subsurface import PRESETS
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_put, is_null, vec3_put
@@ -24,7 +25,8 @@ FOG = sr.HomogeneousMedium(scattering=2)
 @kernel
 def ask_rest(material: Table, u: f64, v: f64, cos_view: f64, stretch: f64, out: Table) -> None:
     where = anywhere(u, v, Vec3(0.0, 0.0, 0.0))
-    vec3_put(out, 0, bent_normal(material, where, stretch))
+    way = Way(stretch, Vec3(stretch, 0.0, 0.0), Vec3(0.0, stretch, 0.0))
+    vec3_put(out, 0, bent_normal(material, where, way))
     f64_put(out, 4, opacity(material, where))
     f64_put(out, 5, 0.0 if is_null(interior(material)) else 1.0)
     vec3_put(out, 8, emitted(material, where, cos_view))
@@ -215,3 +217,56 @@ def test_maps_are_read_without_the_curve_of_pictures(tmp_path):
     assert sr.NormalMap(material=sr.Lambert(), map=bitmap).map.linear
     assert sr.Conductor(roughness=bitmap).roughness.linear
     assert not sr.Principled(base_color=bitmap).base_color.linear
+
+
+def test_tables_of_energy_are_computed_once_for_all_processes(tmp_path, monkeypatch):
+    """And again where the file is damaged; equal to the bit."""
+    monkeypatch.setenv("SIGHTRAY_CACHE_DIR", str(tmp_path))
+    calls = []
+
+    def doubled(x: float) -> np.ndarray:
+        calls.append(x)
+        return np.array([2.0 * x, 0.1])
+
+    for once in (1, 2):  # two processes
+        table = stored(doubled)
+        for _ in range(2):
+            np.testing.assert_array_equal(table(3.5), [7.0, 0.1])
+        assert calls == [3.5], once
+    (file,) = tmp_path.glob("*.npy")
+    file.write_bytes(file.read_bytes()[:-3])
+    np.testing.assert_array_equal(stored(doubled)(3.5), [7.0, 0.1])
+    assert len(calls) == 2
+    np.testing.assert_array_equal(stored(doubled)(4.5), [9.0, 0.1])
+    assert len(list(tmp_path.iterdir())) == 2
+    monkeypatch.setenv("SIGHTRAY_CACHE_DIR", "")
+    np.testing.assert_array_equal(stored(doubled)(3.5), [7.0, 0.1])
+
+
+TURNED = sr.Transform.translate(0.2, 0.1, 0) @ sr.Transform.rotate((1, 2, 0.5), 40)
+SOLID = {
+    "sphere": (sr.Sphere(radius=0.8), sr.Transform()),
+    "turned box": (sr.Box(), TURNED),
+    "mirrored and stretched box": (sr.Box(), TURNED @ sr.Transform.scale(-1.2, 0.7, 0.9)),
+    "cylinder": (sr.Cylinder(), TURNED),
+}
+
+
+@pytest.mark.parametrize("name", SOLID)
+def test_solid_relief_follows_the_surface(name):
+    """Heights that grow along an axis of the shape's space tilt normals by their slope within the surface."""
+    shape, place = SOLID[name]
+    height = sr.Gradient(colors=[[0] * 3, [1] * 3], along="z", begin=-5, end=5)
+    bump = sr.BumpMap(material=sr.Lambert(), height=height, scale=3)
+    scene = sr.Scene(sr.Instance(of=shape.replace(material=bump), transform=place),
+                     camera=sr.PerspectiveCamera(eye=(1.5, 1, 4), vfov=40, width=24, height=18))  # fmt: skip
+    labels = sr.label(scene, "normal", "shading_normal")
+    slope = 0.3 * np.linalg.inv(place.matrix[:3, :3]).T @ (0, 0, 1)
+    n = np.asarray(labels.normal, float)
+    hit = np.isfinite(n[..., 0])
+    assert hit.sum() > 40
+    n = n[hit]
+    expected = n - (slope - n * (n @ slope)[:, None])
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert np.abs(expected - n).max() > 0.05
+    np.testing.assert_allclose(np.asarray(labels.shading_normal, float)[hit], expected, atol=1e-5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.ndimage import map_coordinates
 
 import sightray as sr
 from sightray._jit import kernel, native
+from sightray.errors import SceneError
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put, no_table, vec3_at, vec3_put
 from sightray.media.base import phase, sample_distance, sample_phase, transmittance
@@ -176,3 +178,52 @@ def test_bad_grids_are_refused():
         sr.GridMedium(density=-np.ones((1, 1, 1)))
     with pytest.raises(sr.SceneError, match="above lower"):
         sr.GridMedium(density=np.ones((1, 1, 1)), upper=(0, 1, 1))
+
+
+# --- densities from files --------------------------------------------------------------------------------------------
+
+
+def vol(densities, *, version=3, encoding=1, channels=1, size=None) -> bytes:
+    """A volume as Mitsuba's manual describes the file."""
+    nz, ny, nx = densities.shape
+    head = b"VOL" + bytes([version]) + struct.pack("<5i6f", encoding, *(size or (nx, ny, nz)), channels, 0, 0, 0, 1, 1, 1)
+    return head + np.asarray(densities, "<f4").tobytes()
+
+
+def test_densities_from_files_are_those_of_the_array(tmp_path):
+    densities = np.random.default_rng(1).random((3, 4, 5)).astype(np.float32)
+    np.save(tmp_path / "smoke.npy", densities.astype(np.float64))
+    (tmp_path / "smoke.vol").write_bytes(vol(densities))
+    for name in ("smoke.npy", "smoke.vol"):
+        np.testing.assert_array_equal(sr.GridMedium(density=tmp_path / name).density, densities)
+        (tmp_path / "scene.yaml").write_text(
+            f"medium: {{type: GridMedium, density: {name}}}\nobjects: [{{type: Sphere}}]\n"
+        )
+        scene = sr.load(tmp_path / "scene.yaml")
+        np.testing.assert_array_equal(scene.medium.density, densities)
+    large = scene.replace(medium=sr.GridMedium(density=np.tile(densities, (3, 3, 3))))
+    (tmp_path / "saved").mkdir()
+    sr.save(large, tmp_path / "saved" / "s.yaml")
+    assert len((tmp_path / "saved" / "s.yaml").read_text()) < 600  # the grid stands beside it
+    np.testing.assert_array_equal(sr.load(tmp_path / "saved" / "s.yaml").medium.density, large.medium.density)
+
+
+@pytest.mark.parametrize(("name", "content", "words"), [
+    ("smoke.vol", b"VOL\x03", "too short"),
+    ("smoke.vol", vol(np.ones((2, 2, 2)))[:-1], "too short for 2 x 2 x 2"),
+    ("smoke.vol", vol(np.ones((1, 1, 1)), size=(2**30, 2**30, 2**30)), "too short for"),
+    ("smoke.vol", vol(np.ones((1, 1, 1)), size=(-1, -1, 1)), "too short for"),
+    ("smoke.vol", vol(np.ones((2, 2, 2)), version=4), "version 3"),
+    ("smoke.vol", vol(np.ones((2, 2, 2)), encoding=2), "encoding 2"),
+    ("smoke.vol", vol(np.ones((2, 2, 2)), channels=3), "3 channels"),
+    ("smoke.npy", b"\x93NUMPY", "smoke.npy"),
+    ("smoke.npy", b"", "smoke.npy"),
+    ("smoke.vdb", b"", "unknown suffix '.vdb'"),
+    (None, b"", "No such file"),
+])  # fmt: skip
+def test_files_that_hold_no_densities_are_told(name, content, words, tmp_path):
+    path = tmp_path / (name or "none.npy")
+    if name is not None:
+        path.write_bytes(content)
+    with pytest.raises(SceneError, match=words):
+        sr.GridMedium(density=path)

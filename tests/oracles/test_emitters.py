@@ -13,7 +13,7 @@ from sightray.lights.base import direction_density, illuminate
 from sightray.materials.base import emitted
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put, vec3_at, vec3_put
-from sightray.scene.compile import compile_scene
+from sightray.scene.compile import compile_scene, flatten
 from sightray.scene.light_choice import choose_light
 from sightray.scene.world import LAMP_COUNT, LIGHT_COUNT, find_closest, light_at, light_count, point_of, thin_beam
 
@@ -139,3 +139,83 @@ def test_a_sphere_that_glows_does_not_light_itself_from_within():
     scene = sr.Scene(sr.Sphere(material=sr.Lambert(albedo=0.5, emission=1)), camera=camera)
     image = np.asarray(sr.render(scene, sr.PathTracer(max_depth=3), samples=16))
     np.testing.assert_allclose(image, 1.875, rtol=1e-6)
+
+
+# --- painted lamps --------------------------------------------------------------------------------------------------
+
+
+def sheet(side: int, **options) -> sr.Mesh:
+    """A level square of side 2 at y = 1 that faces down, of ``2 side²`` triangles; u runs along x, v along -z."""
+    s = np.linspace(0, 1, side + 1)
+    u, v = (part.ravel() for part in np.meshgrid(s, s))
+    a = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    faces = np.concatenate([np.stack([a, a + side + 1, a + 1], 1), np.stack([a + 1, a + side + 1, a + side + 2], 1)])
+    return sr.Mesh(vertices=np.stack([2 * u - 1, np.ones(u.size), 1 - 2 * v], 1), faces=faces,
+                   uvs=np.stack([u, v], 1), **options)  # fmt: skip
+
+
+def spotted(rng) -> np.ndarray:
+    """A dark picture, (48, 80, 3), with some bright spots of a texel each."""
+    picture = np.full((48, 80, 3), 0.01)
+    picture[rng.integers(0, 48, 6), rng.integers(0, 80, 6)] = rng.uniform(50, 200, (6, 3))
+    return picture
+
+
+@pytest.mark.parametrize("side", [1, 3, 40, 200])
+@pytest.mark.parametrize("wrap", ["repeat", "mirror", "clamp"])
+def test_triangles_of_a_painted_lamp_count_by_what_is_painted_on_them(side, wrap):
+    """Against the mean of many places; what shines is never taken for dark."""
+    from sightray.scene.emitters import EVENLY, lights_of
+
+    rng = np.random.default_rng(side)
+    smooth = np.cumsum(np.cumsum(rng.normal(size=(48, 80, 3)), 0), 1)
+    painted = sr.Bitmap(image=np.float32(smooth - smooth.min()), wrap=wrap, scale=(1.7, -0.6), offset=(0.3, 0.2))
+    mesh = sheet(side)
+    corners = mesh.uvs[mesh.faces] * painted.scale + painted.offset
+    found = sr.Multiply(a=painted, b=(3, 3, 3)).brightness_over(mesh.uvs[mesh.faces])
+    picked = rng.choice(len(corners), min(20, len(corners)), replace=False)
+    for k in picked:
+        w = rng.dirichlet((1, 1, 1), 20_000) @ corners[k] * (80, 48) - 0.5
+        i = np.floor(w).astype(int)
+        i = {"repeat": i % (80, 48), "clamp": np.clip(i, 0, (79, 47)),
+             "mirror": np.minimum(i % (160, 96), (159, 95) - i % (160, 96))}[wrap]  # fmt: skip
+        mean = 3 * painted.pixels.mean(axis=2)[47 - i[:, 1], i[:, 0]].mean()
+        assert found[k] == pytest.approx(mean, rel=0.1, abs=0.2 * float(np.ptp(painted.pixels)))  # at edges where it wraps
+
+    lamp = sr.Emitter(radiance=sr.Bitmap(image=spotted(rng)))
+    mesh = sheet(side, material=lamp)
+    (item,) = flatten(sr.Scene(mesh))
+    shine = lights_of(item).bounds.intensity
+    total = lamp.glow * 4.0
+    assert shine.sum() == pytest.approx(total, rel=0.15)
+    assert (shine > EVENLY * total / len(shine) * 0.99).all()
+
+
+def test_a_spot_on_a_large_screen_lights_as_a_small_lamp_does():
+    """Of 3200 triangles two shine: light is exact at the hit, and as free of noise as that of a lamp of that size."""
+    picture = np.zeros((40, 40, 3), np.float32)
+    picture[7, 22] = (30, 20, 10)
+    screen = sheet(40, material=sr.Emitter(radiance=sr.Bitmap(image=picture, filter="nearest")))
+    x, z = 22 / 20 - 1, 1 - 2 * (40 - 7) / 40
+    lamp = sr.Rectangle(corner=(x, 1, z), edge_u=(0.05, 0, 0), edge_v=(0, 0, 0.05),
+                        material=sr.Emitter(radiance=(30, 20, 10)))  # fmt: skip
+    pictures, noises = [], []
+    for thing in (screen, lamp):
+        scene = sr.Scene(FLOOR, thing, camera=CAMERA)
+        many = [np.asarray(sr.render(scene, sr.PathTracer(max_depth=1), samples=16, seed=s)) for s in range(8)]
+        floor = np.array(many)[:, 16:]
+        pictures.append(floor.mean(axis=0))
+        noises.append(np.sqrt(floor.var(axis=0).mean()) / floor.mean())
+    np.testing.assert_allclose(pictures[0].mean(axis=(0, 1)), pictures[1].mean(axis=(0, 1)), rtol=0.01)
+    assert noises[0] < 0.12
+    assert noises[1] < 0.12
+
+
+def test_what_is_painted_glows_where_it_is():
+    """A ray that meets the screen sees the texel, in RGB; with a spectrum its luminance counts."""
+    picture = np.random.default_rng(3).uniform(0.2, 1, (3, 4, 3)).astype(np.float32)
+    wall = sr.Rectangle(corner=(-2, -1.5, 0), edge_u=(4, 0, 0), edge_v=(0, 3, 0),
+                        material=sr.Emitter(radiance=sr.Bitmap(image=picture, filter="nearest")))  # fmt: skip
+    camera = sr.OrthographicCamera(eye=(0, 0, 5), target=(0, 0, 0), height=3, view_height=3, width=4)
+    seen = np.asarray(sr.render(sr.Scene(wall, camera=camera), sr.PathTracer(), samples=1))
+    np.testing.assert_allclose(seen, picture, rtol=1e-5)

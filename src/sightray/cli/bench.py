@@ -49,15 +49,17 @@ def scaling(
 
 @bench.command()
 def render(
-    peers: Annotated[bool, typer.Option(help="Also Mitsuba 3, if it is installed.")] = False,
+    peers: Annotated[bool, typer.Option(help="Also Mitsuba 3, and Cycles by Blender's bpy, if installed.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder to save all pictures in.")] = None,
     only: Annotated[str | None, typer.Option(help="Names of scenes with commas between; by default all four.")] = None,
+    peer_python: Annotated[Path | None, typer.Option(
+        help="A Python that has bpy, if this one has not.", envvar="SIGHTRAY_PEER_PYTHON")] = None,
 ) -> None:
     """Path tracing: paths each second, error, and time to equal error, on four scenes. Takes minutes."""
     from sightray.cli import bench_render
 
-    bench_render.render(peers, as_json, output, only)
+    bench_render.render(peers, as_json, output, only, peer_python)
 
 
 @bench.command()

@@ -1,11 +1,17 @@
-"""``sightray bench render``: path tracing, by itself and against Mitsuba 3: time, paths each second, time to equal error.
+"""``sightray bench render``: path tracing, by itself and against Mitsuba 3 and Cycles: time, paths each second, time to
+equal error.
 
 Every renderer draws the same scenes at the same size and depth, in turns, so that what else the machine does meets all
 alike. The error of a picture is relMSE, the mean of (x - r)² / (r² + 0.01) over pixels and channels, against a reference
 r of many more samples. For unbiased renderers it falls as one over the time, nearly; **time to error** is read from the
-straight line through the logarithms of what was measured. We run twice: with as many samples in every pixel, as the
-others do, which is what paths each second are compared by; and with ``adaptive="error"``, which spends as many where the
-estimated error is, and the scene's own number of shadow rays, which time to error is compared by.
+straight line through the logarithms of what was measured. We run first with as many samples in every pixel, as the
+others do, which is what paths each second are compared by; then with ``adaptive="error"``, which spends as many where the
+estimated error is, and the scene's own number of shadow rays; and with both kinds of samples by `SharedPathTracer`. Time to
+error is compared by the best of these. The reference is ours, with as many samples everywhere.
+
+Cycles runs in a process of its own (see `bench_cycles`); the time to hand over the scene and the picture is not counted
+for it. ``bias`` is how far the mean of a renderer's picture is from the reference's, of all samples and rounds together:
+beyond noise it tells that two did not render the same scene.
 """
 
 from __future__ import annotations
@@ -34,6 +40,7 @@ class Renderer(NamedTuple):
 
     name: str
     render: Render
+    fixed: float = 0.0  # seconds of each picture that are not counted
 
 
 class Result(NamedTuple):
@@ -45,6 +52,7 @@ class Result(NamedTuple):
     seconds: tuple[float, ...]  # for each of SAMPLES
     relmse: tuple[float, ...]
     seconds_to_error: float  # to reach what we reach with the most samples
+    bias: float  # mean over that of the reference, minus 1
     absent: str = ""
 
 
@@ -67,16 +75,21 @@ def depth_of(scene: Any) -> int:
     return getattr(scene.integrator, "max_depth", 8) if scene.integrator is not None else 8
 
 
-def sightray_renderer(scene: Any, threads: int, adaptive: bool) -> Renderer:
-    """Ourselves: as the others do it, or with samples where the error is and the scene's own settings."""
+def sightray_renderers(scene: Any, threads: int) -> list[Renderer]:
+    """Ourselves: first as the others do it, then with what we have beside."""
     import sightray as sr
 
-    tracer = sr.PathTracer(max_depth=depth_of(scene))
-    if adaptive and scene.integrator is not None:
-        tracer = scene.integrator
-    return Renderer("sightray, adaptive" if adaptive else "sightray", lambda samples, seed: np.asarray(
-        sr.render(scene, tracer, samples=samples, seed=seed, threads=threads,
-                  adaptive="error" if adaptive else None)))  # fmt: skip
+    plain = sr.PathTracer(max_depth=depth_of(scene))
+    own = plain if scene.integrator is None else scene.integrator
+    shared = sr.SharedPathTracer(max_depth=depth_of(scene), light_samples=getattr(own, "light_samples", 1))
+    ways = {"sightray": (plain, None), "sightray, adaptive": (own, "error"), "sightray, shared": (shared, None),
+            "sightray, shared, adaptive": (shared, "error")}  # fmt: skip
+
+    def renderer(name: str, tracer: Any, adaptive: Any) -> Renderer:
+        return Renderer(name, lambda samples, seed: np.asarray(
+            sr.render(scene, tracer, samples=samples, seed=seed, threads=threads, adaptive=adaptive)))  # fmt: skip
+
+    return [renderer(name, *way) for name, way in ways.items()]
 
 
 def mitsuba_renderer(scene: Any, threads: int) -> Renderer:
@@ -93,33 +106,43 @@ def mitsuba_renderer(scene: Any, threads: int) -> Renderer:
         mi.render(loaded, spp=samples, seed=seed)))  # fmt: skip
 
 
-PEERS = {"Mitsuba": mitsuba_renderer}
+def cycles_renderer(scene: Any, threads: int) -> Renderer:
+    """Cycles on the processor, in its own process."""
+    from sightray.cli.bench_cycles import Cycles
+
+    cycles = Cycles(scene, depth_of(scene), threads)
+    return Renderer(cycles.name, cycles.render, cycles.fixed)
+
+
+PEERS = {"Mitsuba": mitsuba_renderer, "Cycles": cycles_renderer}
 
 
 def race(name: str, peers: bool, threads: int, folder: Path | None, rounds: int = 3) -> list[Result]:
     """All renderers on one scene."""
     scene = bench_scene(name, SIDE)
-    runners, absent = [sightray_renderer(scene, threads, False), sightray_renderer(scene, threads, True)], []
+    runners, absent = sightray_renderers(scene, threads), []
     for peer, make in PEERS.items() if peers else ():
         try:
             runners.append(make(scene, threads))
         except Exception as reason:
             said = f"{type(reason).__name__}: {reason}".splitlines()[0][:100]
-            absent.append(Result(name, peer, math.nan, (), (), math.nan, said))
-    reference = runners[1].render(REFERENCE, 1_000_003)
+            absent.append(Result(name, peer, math.nan, (), (), math.nan, math.nan, said))
+    reference = runners[2].render(REFERENCE, 1_000_003)
 
     # In turns; the first round warms up and is not counted. The median of times, the mean of errors.
     times: dict[tuple[str, int], list[float]] = {}
     errors: dict[tuple[str, int], list[float]] = {}
+    means: dict[str, list[float]] = {}
     for turn in range(rounds + 1):
         for samples in SAMPLES:
             for runner in runners:
                 start = time.perf_counter()
                 picture = runner.render(samples, turn)
-                taken = time.perf_counter() - start
+                taken = time.perf_counter() - start - runner.fixed
                 if turn > 0:
                     times.setdefault((runner.name, samples), []).append(taken)
                     errors.setdefault((runner.name, samples), []).append(rel_mse(picture, reference))
+                    means.setdefault(runner.name, []).extend([float(picture.mean(dtype=float))] * samples)
                 if folder is not None and turn == rounds:
                     _save(picture, folder / f"{name}-{runner.name.lower().replace(', ', '-').split()[0]}-{samples}.png")
     if folder is not None:
@@ -131,7 +154,8 @@ def race(name: str, peers: bool, threads: int, folder: Path | None, rounds: int 
         seconds = tuple(float(np.median(times[runner.name, s])) for s in SAMPLES)
         error = tuple(float(np.mean(errors[runner.name, s])) for s in SAMPLES)
         rate = pixels * SAMPLES[-1] / seconds[-1] / 1e6
-        found.append(Result(name, runner.name, rate, seconds, error, time_to(goal, seconds, error)))
+        bias = float(np.mean(means[runner.name])) / float(reference.mean(dtype=float)) - 1
+        found.append(Result(name, runner.name, rate, seconds, error, time_to(goal, seconds, error), bias))
     return found + absent
 
 
@@ -147,10 +171,13 @@ def _save(picture: np.ndarray, path: Path) -> None:
     sr.Image(np.float32(picture[..., :3])).save(path)
 
 
-def render(peers: bool, json: bool, folder: Path | None, only: str | None) -> None:
-    """Measure, and print a table or JSON."""
+def render(peers: bool, json: bool, folder: Path | None, only: str | None, peer_python: Path | None = None) -> None:
+    """Measure, and print a table or JSON. `peer_python` has what this Python has not: Blender's ``bpy``."""
+    from sightray.cli.bench_cycles import PYTHON
     from sightray.scene.parallel import core_count
 
+    if peer_python is not None:
+        os.environ[PYTHON] = str(peer_python)
     os.environ.setdefault("DRJIT_LIBLLVM_PATH", "/usr/lib/x86_64-linux-gnu/libLLVM-19.so")
     threads = core_count()
     if folder is not None:
@@ -171,20 +198,22 @@ def print_results(results: list[Result], threads: int) -> None:
 
     title = f"Path tracing at height {SIDE}, {threads} threads; in brackets: sightray is that many times as fast"
     table = Table(title=title)
-    for heading in ("scene", "renderer", "Mpaths/s", f"s at {SAMPLES[-1]}", f"relMSE at {SAMPLES[-1]}", "s to our error"):
+    for heading in ("scene", "renderer", "Mpaths/s", f"s at {SAMPLES[-1]}", f"relMSE at {SAMPLES[-1]}", "s to our error",
+                    "mean"):  # fmt: skip
         table.add_column(heading, justify="left" if heading in ("scene", "renderer") else "right")
     even: dict[str, Result] = {}
     best: dict[str, Result] = {}
     for row in results:
         if row.absent:
-            table.add_row(row.scene, row.renderer, f"absent: {row.absent}", "", "", "")
+            table.add_row(row.scene, row.renderer, f"absent: {row.absent}", "", "", "", "")
             continue
         rate, when = f"{row.mpaths_per_second:.2f}", f"{row.seconds_to_error:.2f}"
         if row.renderer.startswith("sightray"):
             even.setdefault(row.scene, row)
-            best[row.scene] = row
+            best[row.scene] = min(row, best.get(row.scene, row), key=lambda one: one.seconds_to_error)
         else:
             rate += f" ({even[row.scene].mpaths_per_second / row.mpaths_per_second:.2f})"
             when += f" ({row.seconds_to_error / best[row.scene].seconds_to_error:.2f})"
-        table.add_row(row.scene, row.renderer, rate, f"{row.seconds[-1]:.2f}", f"{row.relmse[-1]:.2e}", when)
+        table.add_row(row.scene, row.renderer, rate, f"{row.seconds[-1]:.2f}", f"{row.relmse[-1]:.2e}", when,
+                      f"{row.bias:+.2%}")  # fmt: skip
     Console().print(table)

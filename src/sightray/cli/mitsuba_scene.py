@@ -100,7 +100,8 @@ def _light(light: Any, mi: Any) -> dict[str, Any]:
         place = np.eye(4)
         place[:3] = np.column_stack([u, v, n / np.linalg.norm(n), np.asarray(light.corner) + u + v])
         emitter = {"type": "area", "radiance": _rgb(light.radiance)}
-        return {"type": "rectangle", "to_world": _place(place, mi), "emitter": emitter}
+        black = {"type": "diffuse", "reflectance": _rgb((0, 0, 0))}
+        return {"type": "rectangle", "to_world": _place(place, mi), "emitter": emitter, "bsdf": black}
     if kind == "EnvironmentLight":
         pixels = np.array(light.pixels * np.float32(light.radiance), order="C")
         turn = np.diag([-1.0, 1.0, -1.0, 1.0])  # its first column looks where our middle one does

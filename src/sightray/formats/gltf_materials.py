@@ -1,8 +1,10 @@
 """Materials of glTF files, as `Principled` and what goes around it.
 
 Read are pbrMetallicRoughness, normal and emissive textures, alphaMode, and KHR_materials_ior, _specular, _clearcoat,
-_sheen, _transmission, _volume and _emissive_strength. Occlusion is ignored: light finds out by itself what is hidden.
-All textures of a material are laid out as its first one is; those that use other texture coordinates are ignored.
+_sheen, _transmission, _volume, _anisotropy, _dispersion and _emissive_strength. Occlusion is ignored: light finds out by
+itself what is hidden. Anisotropy is the same all over a surface: its texture is ignored, and where the roughness is a
+picture, its mean decides how uneven it becomes. All textures of a material are laid out as its first one is; those that
+use other texture coordinates are ignored.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from sightray.formats.base import TEXTURES
 from sightray.formats.gltf_buffers import Buffers
 from sightray.images import load_image
 from sightray.materials.cutout import Cutout
+from sightray.materials.energy import SMOOTH
+from sightray.materials.microfacet import MOST_UNEVEN
 from sightray.materials.normal_map import NormalMap
 from sightray.materials.principled import Principled
 from sightray.textures.bitmap import Bitmap
@@ -52,13 +56,15 @@ class Materials:
         infos = [self.group(pbr, "baseColorTexture"), self.group(pbr, "metallicRoughnessTexture"),
                  self.group(owner, "normalTexture"), self.group(owner, "emissiveTexture")]  # fmt: skip
         layout = next((info for info in infos if info), {})
+        uneven, rotation, wider = self.anisotropy(owner, infos[1])
         base, rough, normal, emissive = (info if self.fits(info, layout) else {} for info in infos)
         factor = self.floats(pbr, "baseColorFactor", 4, (1, 1, 1, 1))
         strength = self.number(self.extension(owner, "emissive_strength"), "emissiveStrength", 1.0)
         material: Any = Principled(
             base_color=self.colour(base, np.clip(factor[:3], 0, 1)),
             metallic=self.channel(rough, BLUE, self.share(pbr, "metallicFactor", 1.0)),
-            roughness=self.channel(rough, GREEN, self.share(pbr, "roughnessFactor", 1.0)),
+            roughness=self.channel(rough, GREEN, self.share(pbr, "roughnessFactor", 1.0) * wider),
+            anisotropy=uneven, anisotropy_rotation=rotation,
             emission=self.colour(emissive, np.maximum(self.floats(owner, "emissiveFactor", 3, (0, 0, 0)), 0)
                                  * max(0.0, strength)),
             **self.extensions(owner, layout),
@@ -68,11 +74,32 @@ class Materials:
             material = NormalMap(material=material, map=self.bitmap(normal, linear=True), strength=scale)
         return self.with_holes(material, owner, base, float(np.clip(factor[3], 0, 1))), layout
 
+    def anisotropy(self, owner: Any, rough: Any) -> tuple[float, float, float]:
+        """Principled's anisotropy and its rotation, and a factor on roughness.
+
+        The alphas of GGX are ``mix(a, 1, strength²)`` along the direction and a across it, with a = roughness². Those of
+        `Principled` are a' / aspect and a' aspect, with aspect² = 1 - 0.9 anisotropy; so a' is their geometric mean.
+        """
+        stated = self.extension(owner, "anisotropy")
+        strength = self.share(stated, "anisotropyStrength", 0.0)
+        if not strength > 0.0:
+            return 0.0, 0.0, 1.0
+        mean = self.share(self.group(owner, "pbrMetallicRoughness"), "roughnessFactor", 1.0)
+        if rough:
+            pixels = self.pixels(rough, linear=True)
+            mean *= float(pixels[..., min(GREEN, pixels.shape[2] - 1)].mean())
+        across = max(SMOOTH, mean**2)
+        along = across + (1.0 - across) * strength**2
+        uneven = min(1.0, (1.0 - across / along) / MOST_UNEVEN)
+        turn = math.degrees(self.number(stated, "anisotropyRotation", 0.0))
+        return uneven, turn, (along / across) ** 0.25
+
     def extensions(self, owner: Any, layout: Any) -> dict[str, Any]:
         """Fields that extensions state."""
         fields: dict[str, Any] = {}
         ior = self.number(self.extension(owner, "ior"), "ior", 1.5)
         fields["ior"] = ior if ior >= 1 else 1.5
+        fields["dispersion"] = max(0.0, self.number(self.extension(owner, "dispersion"), "dispersion", 0.0))
         fields["specular"] = self.share(self.extension(owner, "specular"), "specularFactor", 1.0)
         for name, keys in (
             ("clearcoat", {"clearcoat": ("clearcoat", RED), "clearcoat_roughness": ("clearcoatRoughness", GREEN)}),

@@ -16,6 +16,7 @@ from sightray.formats.base import TEXTURES, Limits, asset, formats, reading
 from sightray.formats.yaml_nodes import Node
 from sightray.formats.yaml_transform import parse_motion, parse_transform
 from sightray.images import load_image
+from sightray.media.grid_files import SUFFIXES as DENSITIES
 from sightray.registry import Member, members
 from sightray.scene.instance import Group
 from sightray.scene.scene import Scene
@@ -142,6 +143,8 @@ class Builder:
             return parse_motion(node, self.path, where)
         if field.name == "image":
             return self.image(node, where)
+        if field.name == "density" and isinstance(node.value, str):
+            return asset(self.path, node.value, DENSITIES, node.line)
         if isinstance(field, Child):
             stated = isinstance(node.value, dict | str)
             return self.member(node, (field.family,), where) if stated else node.plain()

@@ -85,6 +85,9 @@ class Writer:
             value = getattr(member, name)
             if name == "image" and value is not None:
                 result[name] = self.image(value)
+            elif name == "density" and value.size > INLINE:
+                result[name] = self.beside("density", ".npy")
+                np.save(self.path.parent / result[name], value)
             elif not (beside and name in FROM_FILE) and not is_default(field, value):
                 result[name] = self.plain(field.plain(value), f"{where}.{name}")
         return result

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sightray.spectra import WAVELENGTHS, rgb_from_xyz, white, xyz_bar
+from sightray.spectra.observer import rgb_bar
+from sightray.spectra.tables import rows_of
 
 SUN_KELVIN = 5772.0  # effective temperature of the sun (IAU 2015)
 SUN_RADIUS = 0.2665  # degrees, mean over the year
@@ -78,6 +80,20 @@ def sky_brightness(sky: Perez, sun: np.ndarray, directions: np.ndarray) -> np.nd
     luminance, x, y = np.moveaxis(sky.at(directions[..., 1], gamma), -1, 0)
     xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1) * luminance[..., None]
     return np.maximum(xyz @ rgb_of_luminance().T, 0.0)
+
+
+def daylight_rows() -> np.ndarray:
+    """(471, 3) at `WAVELENGTHS`: the spectra of daylight whose colours are (1, 0, 0), (0, 1, 0) and (0, 0, 1).
+
+    Sums of them are sums of the three components by which the CIE describes all phases of daylight, so they come near to
+    what sky and sun send out, and are of the colour that they stand for.
+
+    Reference: D. Judd, D. MacAdam, G. Wyszecki, "Spectral distribution of typical daylight as a function of correlated
+    color temperature", JOSA 54(8), 1964.
+    """
+    nm, *parts = rows_of("daylight").T
+    components = np.stack([np.interp(WAVELENGTHS, nm, part) for part in parts], axis=1)
+    return np.ascontiguousarray(components @ np.linalg.inv(components.T @ rgb_bar()).T)
 
 
 def sun_brightness(turbidity: float, theta: float) -> np.ndarray:

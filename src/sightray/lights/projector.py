@@ -21,8 +21,9 @@ from sightray.fields import (
     number,
     vector,
 )
-from sightray.lights.base import Light, LightBounds, LightSample, illuminate
-from sightray.lights.picture import picture, pixel_at, radiant_pixels
+from sightray.lights.base import LightBounds, LightSample, illuminate
+from sightray.lights.lit import _Lit
+from sightray.lights.picture import LUMINANCE, picture, pixel_at, radiant_pixels
 from sightray.mathlib.axes import unit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
@@ -31,7 +32,7 @@ from sightray.mathlib.vec import Vec3, dot, grey, length
 NEAREST, BILINEAR = 0, 1
 
 
-class ProjectorLight(Light):
+class ProjectorLight(_Lit):
     """Throws a picture from `eye` towards `target`, as a pinhole camera of the same pose would take it.
 
     The point (X, Y, Z) in the frame of the pose (+x right, +y down, +z forward) lies in the pixel
@@ -43,7 +44,8 @@ class ProjectorLight(Light):
     r is ``intensity * pixel / r²``, and nothing outside of the picture. Structured light is a projector and a camera
     side by side.
 
-    `filter` says whether pixels have hard edges ("nearest") or blend ("bilinear").
+    `filter` says whether pixels have hard edges ("nearest") or blend ("bilinear"). Where a `spectrum` is stated, as for the
+    one laser or diode of a scanner, all of the picture has it, and its pixels count by their luminance.
 
     Reference: R. Hartley, A. Zisserman, Multiple View Geometry, 2nd ed. 2003, section 6.1.
     """
@@ -62,6 +64,7 @@ class ProjectorLight(Light):
     _width: Any = derived_integer("columns", lambda p: p.pixels.shape[1])
     _height: Any = derived_integer("rows", lambda p: p.pixels.shape[0])
     _pixels: Any = derived_array("colours, three floats each", lambda p: p.pixels)
+    _shown: Any = derived_vector("radiant intensity in RGB", lambda p: p.shown())
 
     @property
     def pixels(self) -> np.ndarray:
@@ -72,8 +75,15 @@ class ProjectorLight(Light):
         """Read the file once, so that a missing one is an error where the light is stated."""
         if self.image is None:
             raise SceneError("ProjectorLight.image: missing; it needs a picture file or an array")
-        object.__setattr__(self, "_picture", radiant_pixels(self.image, "ProjectorLight"))
+        found = radiant_pixels(self.image, "ProjectorLight")
+        if self.spectrum is not None:
+            found = np.repeat((found.astype(np.float64) @ LUMINANCE)[..., None], 3, axis=2).astype(np.float32)
+            found.flags.writeable = False
+        object.__setattr__(self, "_picture", found)
         self.world_from_projector()
+
+    def color_of_light(self) -> Any:
+        return self.intensity
 
     def focal(self) -> float:
         """Focal length, pixels."""
@@ -109,11 +119,11 @@ class ProjectorLight(Light):
         half = math.atan(math.hypot(w, h) / 2 / self.focal())
         at = np.array(self.eye)
         return LightBounds(
-            at, at, pose[:3, 2], half, 1e-3, float((self.pixels.mean(axis=(0, 1)) * self.intensity).mean())
+            at, at, pose[:3, 2], half, 1e-3, float((self.pixels.mean(axis=(0, 1)) * self.shown()).mean())
         )
 
 
-EYE, _, _, _, INTENSITY, FILTER, RIGHT, DOWN, FORWARD, FOCAL, WIDTH, HEIGHT, PIXELS = ProjectorLight.offsets()
+EYE, _, _, _, _, FILTER, RIGHT, DOWN, FORWARD, FOCAL, WIDTH, HEIGHT, PIXELS, INTENSITY = ProjectorLight.offsets()[1:]
 
 
 @kernel

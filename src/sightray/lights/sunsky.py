@@ -23,12 +23,21 @@ from sightray.fields import (
     vector,
 )
 from sightray.lights.area import MAX_GRID, cut, place_in_cells
-from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, sky
-from sightray.lights.daylight import SUN_RADIUS, Perez, preetham, rgb_of_luminance, sky_brightness, sun_brightness
+from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, in_lanes, sky
+from sightray.lights.daylight import (
+    SUN_RADIUS,
+    Perez,
+    daylight_rows,
+    preetham,
+    rgb_of_luminance,
+    sky_brightness,
+    sun_brightness,
+)
 from sightray.lights.daylight import sun_direction as sun_at
 from sightray.lights.environment import column_of, row_of, solid_angle_of
 from sightray.lights.picture import LUMINANCE
 from sightray.lights.sphere import in_cone
+from sightray.materials.by_wavelength import at_bands
 from sightray.mathlib.axes import unit
 from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
 from sightray.mathlib.scalars import f64, i64
@@ -50,6 +59,8 @@ class SunSky(Light):
 
     The sun stands in `direction`, or where it was at a `time` at a `latitude` and `longitude`; then +x is east and -z
     north. +y is up.
+
+    Spectral paths see the colour of sun or sky as the mixture of the CIE's three components of daylight, cut off at 0.
 
     Radiance is in W/(m² sr) of visible light: luminance over 184 lm/W, the efficacy of D65. A sunny noon brings about
     500 W/m² to the ground, so white paper has a radiance of 150; a `scale` of 0.005 to 0.01 suits pictures without
@@ -87,6 +98,7 @@ class SunSky(Light):
     _green: Any = derived_vector("green from XYZ", lambda s: s.matrix()[1])
     _blue: Any = derived_vector("blue from XYZ", lambda s: s.matrix()[2])
     _sums: Any = derived_array("cumulated weights of the cells", lambda s: cumulated(s.weights()))
+    _daylight: Any = derived_array("daylight that is red, green and blue, by wavelength", lambda s: daylight_rows())
 
     def check(self) -> None:
         if self.time:
@@ -172,7 +184,7 @@ class SunSky(Light):
 
 
 (
-    GRID, TO_SUN, CAP, SUN_SHARE, SUN, BELOW, A, B, C, D, E, ZENITH, RED, GREEN, BLUE, SUMS,
+    GRID, TO_SUN, CAP, SUN_SHARE, SUN, BELOW, A, B, C, D, E, ZENITH, RED, GREEN, BLUE, SUMS, DAYLIGHT,
 ) = SunSky.offsets()[9:]  # fmt: skip
 
 
@@ -206,6 +218,15 @@ def in_sun(light: Table, d: Vec3) -> bool:
 def sky_of_sun_and_sky(light: Table, d: Vec3) -> Vec3:
     rest = radiance_from(light, d)
     return rest + vec3_at(light, SUN) if in_sun(light, d) else rest
+
+
+@implements(in_lanes, SunSky)
+def daylight_in_lanes(light: Table, bands: Table, rgb: Vec3) -> Vec3:
+    rows = table_at(light, DAYLIGHT)
+    mixed = (
+        at_bands(rows, 3, 0, bands) * rgb.x + at_bands(rows, 3, 1, bands) * rgb.y + at_bands(rows, 3, 2, bands) * rgb.z
+    )
+    return vmax(mixed, grey(0.0))
 
 
 @implements(direction_density, SunSky)

@@ -65,6 +65,14 @@ class BsdfValue(NamedTuple):
     density: f64  # with which `sample_bsdf` chooses wi, per solid angle
 
 
+class Way(NamedTuple):
+    """What a unit of u is on the surface, and as long a way across it towards growing v."""
+
+    stretch: f64  # its length in the world, metres; 0 where u does not run
+    along: Vec3  # in the space of the shape
+    across: Vec3
+
+
 class Material(Member, family="materials"):
     """Base of all materials. Unless a member says otherwise it reflects, emits and absorbs nothing.
 
@@ -95,6 +103,11 @@ class Material(Member, family="materials"):
     def glow(self) -> float:
         """About how much radiance it gives off, mean of its colours: for choosing among lamps; 0 if it is dark."""
         return 0.0
+
+    @property
+    def painted_glow(self) -> Any:
+        """The texture of the radiance that it gives off, if that is one: for choosing among the parts of a lamp."""
+        return None
 
     @property
     def clear(self) -> bool:
@@ -163,11 +176,8 @@ def opacity(material: Table, where: Where) -> f64:
 
 
 @method(6)
-def bent_normal(material: Table, where: Where, stretch: f64) -> Vec3:
-    """Shading normal, unit, in the frame of tangent (x), bitangent (y) and normal (z); only `bumpy` ones are asked.
-
-    `stretch`: metres of the surface per unit of u.
-    """
+def bent_normal(material: Table, where: Where, way: Way) -> Vec3:
+    """Shading normal, unit, in the frame of tangent (x), bitangent (y) and normal (z); only `bumpy` ones are asked."""
     raise NotImplementedError
 
 
@@ -214,5 +224,5 @@ def opaque(material: Table, where: Where) -> f64:
 
 
 @implements(bent_normal, Material)
-def straight_normal(material: Table, where: Where, stretch: f64) -> Vec3:
+def straight_normal(material: Table, where: Where, way: Way) -> Vec3:
     return Vec3(0.0, 0.0, 1.0)

@@ -5,45 +5,63 @@ from __future__ import annotations
 from typing import Any
 
 from sightray._jit import implements
-from sightray.fields import Color, color, derived_array, derived_vector, flag, other
+from sightray.fields import derived_array, derived_child, derived_vector, flag, other
 from sightray.materials.base import PHONG, Local, Material, emitted, glow_in_lanes, local
 from sightray.materials.by_wavelength import at_bands
 from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, i64_at, is_null, table_at, vec3_at
-from sightray.mathlib.vec import Vec3, grey
+from sightray.mathlib.vec import Vec3, dot, grey
 from sightray.spectra.lighting import light_rows, plain_light, shown_colour, stated_light
-from sightray.textures.base import Where
+from sightray.textures.base import Texture, Where, texture_value, textured
 
 
 class Emitter(Material):
     """Gives off the same `radiance` in all directions and reflects nothing.
 
     Seen from behind it is black, unless it is `two_sided`: just as the light of a one-sided lamp falls only forwards.
-    Without `spectrum` white is D65; with one, (1, 1, 1) is light of that spectrum at luminance 1.
+    Without `spectrum` white is D65; with one, (1, 1, 1) is light of that spectrum at luminance 1. `radiance` may be a
+    texture, such as the picture of a screen; where a `spectrum` is stated, all of it has that, and its luminance counts.
     """
 
-    radiance: Color = color("radiance that it gives off", default=1.0, unit="W/(m² sr)")
+    radiance: Any = textured("radiance that it gives off, W/(m² sr)", default=1.0, packed=False)
     two_sided: bool = flag("whether the inside of the surface glows too", default=False)
     spectrum: Any = other("illuminant's name, kelvin of a black body, or a Spectrum; None: D65", stated_light, default=None,
                           plain=plain_light)  # fmt: skip
-    _shown: Any = derived_vector("radiance in RGB", lambda e: shown_colour(e.radiance, e.spectrum))
+    _shown: Any = derived_vector("radiance in RGB, or what a texture is multiplied by",
+                                 lambda e: shown_colour(e.colour(), e.spectrum))  # fmt: skip
     _by_wavelength: Any = derived_array("its light by wavelength, over the sum of its colour",
-                                        lambda e: light_rows(e.radiance, e.spectrum))  # fmt: skip
+                                        lambda e: light_rows(e.colour(), e.spectrum))  # fmt: skip
+    _picture: Any = derived_child("texture of the radiance, if it is one",
+                                  lambda e: e.radiance if isinstance(e.radiance, Texture) else None)  # fmt: skip
+
+    def colour(self) -> tuple[float, float, float]:
+        """The stated colour; white for a texture."""
+        return (1.0, 1.0, 1.0) if isinstance(self.radiance, Texture) else self.radiance
 
     @property
     def glow(self) -> float:
-        return sum(self.radiance) / 3
+        return self.radiance.brightness() if isinstance(self.radiance, Texture) else sum(self.radiance) / 3
+
+    @property
+    def painted_glow(self) -> Any:
+        return self.radiance if isinstance(self.radiance, Texture) else None
 
 
-_, TWO_SIDED, RADIANCE, BY_WAVELENGTH = Emitter.offsets()
+TWO_SIDED, RADIANCE, BY_WAVELENGTH, PICTURE = Emitter.offsets()
 
 
 @implements(emitted, Emitter)
 def emitted_by_emitter(material: Table, where: Where, cos_view: f64) -> Vec3:
-    if cos_view > 0.0 or i64_at(material, TWO_SIDED) != 0:
+    if cos_view <= 0.0 and i64_at(material, TWO_SIDED) == 0:
+        return grey(0.0)
+    picture = table_at(material, PICTURE)
+    if is_null(picture):
         return vec3_at(material, RADIANCE)
-    return grey(0.0)
+    painted = texture_value(picture, where)
+    if not is_null(table_at(material, BY_WAVELENGTH)):
+        painted = grey(dot(painted, Vec3(0.2126, 0.7152, 0.0722)))  # luminance of linear Rec. 709
+    return painted * vec3_at(material, RADIANCE)
 
 
 @implements(glow_in_lanes, Emitter)

@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cached_property
 from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from sightray.materials.stored import stored
 
 Array = NDArray[np.float64]
 
@@ -29,19 +31,19 @@ SMOOTH = 1e-4  # alpha below which a surface is a mirror
 ROUGHNESS_NODES = np.arange(ROUGHNESSES) / (ROUGHNESSES - 1)
 
 
-@cache
+@stored
 def missing_of_mirrors(kind: int, anisotropy: float = 0.0) -> Array:
     """What is missing where facets reflect everything: metals."""
     return _table(kind, anisotropy, lambda f: f.reflected)
 
 
-@cache
+@stored
 def missing_of_glass(kind: int, eta: float, anisotropy: float = 0.0) -> Array:
     """What is missing of reflected and refracted light together; `eta`: index before the surface over that behind."""
     return _table(kind, anisotropy, lambda f: f.share(eta) * f.reflected + (1.0 - f.share(eta)) * f.refracted(eta))
 
 
-@cache
+@stored
 def reflected_by_glass(kind: int, eta: float, anisotropy: float = 0.0) -> Array:
     """The light that a rough dielectric reflects, over that which a smooth one would.
 
@@ -58,40 +60,49 @@ def reflected_by_glass(kind: int, eta: float, anisotropy: float = 0.0) -> Array:
 class _Facets:
     """Facets that each of some viewers sees, on grids; kernels of the same mathematics are in microfacet.py.
 
-    `wo`: (n, 3) directions to the viewers. Arrays of facets are (n, POINTS, POINTS).
+    `wo`: (n, 3) directions to the viewers. Arrays of facets are (n, POINTS, POINTS), one for each coordinate: numpy is
+    several times as fast with these as with arrays of triples.
     """
 
     def __init__(self, kind: int, x: float, y: float, wo: Array):
-        self.kind, self.x, self.y, self.wo = kind, x, y, wo[:, np.newaxis, np.newaxis]
-        w = self.wo * (x, y, 1.0)
-        w /= np.linalg.norm(w, axis=-1, keepdims=True)
-        m, self.weight = _visible_cap(w) if kind == 0 else _visible_slopes(w)
-        m *= (x, y, 1.0)
-        self.m = m / np.linalg.norm(m, axis=-1, keepdims=True)
-        self.cosine = np.clip((self.m * self.wo).sum(axis=-1), 0.0, 1.0)
+        self.kind, self.x, self.y = kind, x, y
+        self.wo = tuple(wo.T[:, :, np.newaxis, np.newaxis])
+        stretched = wo * (x, y, 1.0)
+        stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)
+        (u, v, w), self.weight = _visible_cap(stretched) if kind == 0 else _visible_slopes(stretched)
+        u, v = u * x, v * y
+        scale = 1.0 / np.sqrt(u * u + v * v + w * w)
+        self.m = (u * scale, v * scale, w * scale)
+        self.cosine = np.clip(sum(a * b for a, b in zip(self.m, self.wo, strict=True)), 0.0, 1.0)
 
-    @property
+    @cached_property
     def reflected(self) -> Array:
         """Share of what each facet mirrors that leaves the surface."""
-        return self._leaves(2.0 * self.cosine[..., np.newaxis] * self.m - self.wo)
+        twice = 2.0 * self.cosine
+        return self._leaves(*(twice * m - o for m, o in zip(self.m, self.wo, strict=True)))
 
     def refracted(self, eta: float) -> Array:
         """Share of what each facet refracts that leaves the surface on its lower side."""
         inner = np.sqrt(np.maximum(0.0, 1.0 - eta * eta * (1.0 - self.cosine**2)))
-        way = (eta * self.cosine - inner)[..., np.newaxis] * self.m - eta * self.wo
-        return self._leaves(way * (1.0, 1.0, -1.0))
+        bend = eta * self.cosine - inner
+        u, v, w = (bend * m - eta * o for m, o in zip(self.m, self.wo, strict=True))
+        return self._leaves(u, v, -w)
 
     def share(self, eta: float) -> Array:
         """What Fresnel's equations say that each facet reflects."""
         return fresnel_share(self.cosine, eta)
 
-    def _leaves(self, w: Array) -> Array:
-        """Smith's share of facets seen from both directions, over that seen from the viewer's."""
-        before = 1.0 + self._hidden(self.wo)
-        return np.where(w[..., 2] > 0.0, before / (before + self._hidden(w)), 0.0)
+    @cached_property
+    def before(self) -> Array:
+        """1 and the facets that are hidden from the viewer, per seen one."""
+        return 1.0 + self._hidden(*self.wo)
 
-    def _hidden(self, w: Array) -> Array:
-        a2 = ((w[..., 0] * self.x) ** 2 + (w[..., 1] * self.y) ** 2) / np.maximum(w[..., 2], 1e-9) ** 2
+    def _leaves(self, u: Array, v: Array, w: Array) -> Array:
+        """Smith's share of facets seen from both directions, over that seen from the viewer's."""
+        return np.where(w > 0.0, self.before / (self.before + self._hidden(u, v, w)), 0.0)
+
+    def _hidden(self, u: Array, v: Array, w: Array) -> Array:
+        a2 = ((u * self.x) ** 2 + (v * self.y) ** 2) / np.maximum(w, 1e-9) ** 2
         if self.kind == 0:
             return 0.5 * (np.sqrt(1.0 + a2) - 1.0)
         b = 1.0 / np.sqrt(np.maximum(a2, 4e-4))
@@ -125,27 +136,28 @@ def _scaled_erfc(x: Array) -> Array:
     return t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))))
 
 
-def _visible_cap(w: Array) -> tuple[Array, Array]:
-    """Stretched GGX facets that each w sees: equal parts of a spherical cap; and their weights."""
+def _visible_cap(w: Array) -> tuple[tuple[Array, ...], Array]:
+    """Stretched GGX facets that each of (n, 3) w sees: equal parts of a spherical cap; and their weights."""
     u, v = np.meshgrid(*2 * [(np.arange(POINTS) + 0.5) / POINTS], indexing="ij")
-    z = (1.0 - u) * (1.0 + w[..., 2]) - w[..., 2]
+    wx, wy, wz = w.T[:, :, np.newaxis, np.newaxis]
+    z = (1.0 - u) * (1.0 + wz) - wz
     sine = np.sqrt(np.maximum(0.0, 1.0 - z * z))
-    cap = np.stack([sine * np.cos(2 * np.pi * v), sine * np.sin(2 * np.pi * v), z], axis=-1)
-    return cap + w, np.full(z.shape, 1.0 / u.size)
+    facets = (sine * np.cos(2 * np.pi * v) + wx, sine * np.sin(2 * np.pi * v) + wy, z + wz)
+    return facets, np.full(z.shape, 1.0 / u.size)
 
 
-def _visible_slopes(w: Array) -> tuple[Array, Array]:
+def _visible_slopes(w: Array) -> tuple[tuple[Array, ...], Array]:
     """Stretched Beckmann facets that each w sees: slopes at even quantiles, and what is seen of them as weights."""
-    sine = np.maximum(np.hypot(w[..., 0], w[..., 1]), 1e-9)
+    wx, wy, wz = w.T[:, :, np.newaxis, np.newaxis]
+    sine = np.maximum(np.hypot(wx, wy), 1e-9)
     quantiles = (np.arange(POINTS) + 0.5) / POINTS
     normal = NormalDist(sigma=math.sqrt(0.5))
-    highest = [normal.cdf(cot) for cot in (w[..., 2] / sine).ravel()]
+    highest = [normal.cdf(cot) for cot in (wz / sine).ravel()]
     s = np.array([[normal.inv_cdf(q * top) for q in quantiles] for top in highest])[:, :, np.newaxis]
     t = np.array([normal.inv_cdf(q) for q in quantiles])
-    weight = np.broadcast_to(np.maximum(0.0, w[..., 2] - s * sine), (len(w), POINTS, POINTS))
-    c, d = np.where(sine > 1e-6, w[..., 0] / sine, 1.0), np.where(sine > 1e-6, w[..., 1] / sine, 0.0)
-    m = np.stack(np.broadcast_arrays(-(s * c - t * d), -(s * d + t * c), 1.0), axis=-1)
-    return m, weight / weight.sum(axis=(1, 2), keepdims=True)
+    weight = np.broadcast_to(np.maximum(0.0, wz - s * sine), (len(w), POINTS, POINTS))
+    c, d = np.where(sine > 1e-6, wx / sine, 1.0), np.where(sine > 1e-6, wy / sine, 0.0)
+    return (-(s * c - t * d), -(s * d + t * c), np.ones((1, 1, 1))), weight / weight.sum(axis=(1, 2), keepdims=True)
 
 
 def _table(kind: int, anisotropy: float, leaving: Callable[[_Facets], Array]) -> Array:

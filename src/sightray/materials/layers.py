@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.materials.base import BsdfValue
+from sightray.materials.by_wavelength import hero_share
 from sightray.materials.dielectric import Boundary, Passage, pass_boundary, sample_boundary, spread_over
+from sightray.materials.glass import shares_of_lanes
 from sightray.materials.microfacet import (
     GGX,
     Facets,
@@ -45,6 +47,8 @@ class Layers(NamedTuple):
     specular: f64
     eta: f64  # outside over inside
     boundary: Boundary  # of what is clear; its facets are those of the whole base
+    iors: Vec3  # the same index, inside over outside or the other way round, for each lane of colour
+    parted: bool  # whether they differ
     thin: bool
     mean: f64  # of Fresnel's share, over all sides
     coat: f64
@@ -150,9 +154,11 @@ def base_value(x: Layers, bands: Table, o: Vec3, i: Vec3, odds: Odds) -> tuple[V
         passage = pass_sheet(x, o, i) if x.thin else pass_boundary(x.boundary, o, i)
         density += odds.clear * passage.density
         if i.z < 0.0:
-            value += x.base * (x.clear * (passage.refracted + passage.spread))
+            lanes = hero_share(bands) if x.parted else ones(bands)
+            value += x.base * lanes * (x.clear * (passage.refracted + passage.spread))
         else:
-            value += ones(bands) * (x.clear * (passage.share * passage.facet + passage.spread))
+            shares = shares_of_lanes(x.iors, dot(o, normalize(o + i)), True) if x.parted else grey(passage.share)
+            value += ones(bands) * (shares * passage.facet + passage.spread) * x.clear
     if i.z < 0.0:
         return value, density
 

@@ -5,21 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from sightray._jit import implements, kernel
-from sightray.fields import child
+from sightray.fields import child, derived_child
 from sightray.materials.base import (
     BsdfSample,
     BsdfValue,
     Local,
     Material,
+    Way,
     bent_normal,
     bsdf,
     emitted,
+    glow_in_lanes,
     interior,
     local,
     opacity,
     sample_bsdf,
 )  # fmt: skip
 from sightray.materials.data import data, share_of
+from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, is_null, table_at
 from sightray.mathlib.vec import Vec3, grey, max4, normalize
@@ -30,12 +33,14 @@ class Mix(Material):
     """A share `amount` of the surface is made of `b`, the rest of `a`: everything about them is mixed by these shares.
 
     A random choice decides which of the two a path follows, but values and densities are stated for both together, so
-    that lights are found as well as with either. Where both have an inside, that of `a` counts.
+    that lights are found as well as with either. Where both have an inside, that of `a` counts. If one of them glows,
+    it does so with its own spectrum; the light of two lamps is up-sampled from its colour.
     """
 
     a: Any = child("what it is made of where `amount` is 0", "materials")
     b: Any = child("what it is made of where `amount` is 1", "materials")
     amount: Any = data("share of `b`", default=0.5)
+    _lamp: Any = derived_child("the one that glows, if only one does", lambda m: lone_lamp(m.a, m.b))
 
     @property
     def cutout(self) -> bool:
@@ -67,7 +72,14 @@ class Mix(Material):
         return (1.0 - t) * self.a.glow + t * self.b.glow
 
 
-A, B, AMOUNT = Mix.offsets()
+def lone_lamp(a: Any, b: Any) -> Any:
+    """The one of two materials that glows; None if both do, or neither."""
+    if (a.glow > 0.0) == (b.glow > 0.0):
+        return None
+    return a if a.glow > 0.0 else b
+
+
+A, B, AMOUNT, LAMP = Mix.offsets()
 
 
 @implements(local, Mix)
@@ -129,6 +141,12 @@ def emitted_by_mix(material: Table, where: Where, cos_view: f64) -> Vec3:
     )  # fmt: skip
 
 
+@implements(glow_in_lanes, Mix)
+def glow_of_mix(material: Table, bands: Table, rgb: Vec3) -> Vec3:
+    lamp = table_at(material, LAMP)
+    return as_light(bands, rgb) if is_null(lamp) else glow_in_lanes(lamp, bands, rgb)
+
+
 @implements(interior, Mix)
 def interior_of_mix(material: Table) -> Table:
     inside = interior(table_at(material, A))
@@ -142,8 +160,8 @@ def opacity_of_mix(material: Table, where: Where) -> f64:
 
 
 @implements(bent_normal, Mix)
-def bent_normal_of_mix(material: Table, where: Where, stretch: f64) -> Vec3:
+def bent_normal_of_mix(material: Table, where: Where, way: Way) -> Vec3:
     t = share_of(table_at(material, AMOUNT), where)
-    a = bent_normal(table_at(material, A), where, stretch)
-    b = bent_normal(table_at(material, B), where, stretch)
+    a = bent_normal(table_at(material, A), where, way)
+    b = bent_normal(table_at(material, B), where, way)
     return normalize(blend(a, b, t) + Vec3(0.0, 0.0, 1e-9))

@@ -6,10 +6,9 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import number
-from sightray.materials.base import bent_normal
+from sightray.materials.base import Way, bent_normal
 from sightray.materials.data import data
 from sightray.materials.wrapper import INNER, _Wrapper
-from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, table_at
 from sightray.mathlib.vec import Vec3, cross, dot, normalize
 from sightray.textures.base import Where, texture_value
@@ -41,10 +40,10 @@ _, MAP, STRENGTH = NormalMap.offsets()
 
 
 @implements(bent_normal, NormalMap)
-def bent_normal_of_map(material: Table, where: Where, stretch: f64) -> Vec3:
+def bent_normal_of_map(material: Table, where: Where, way: Way) -> Vec3:
     c, s = texture_value(table_at(material, MAP), where), f64_at(material, STRENGTH)
     n = normalize(Vec3((2.0 * c.x - 1.0) * s, (2.0 * c.y - 1.0) * s, max(LOWEST, 2.0 * c.z - 1.0)))
-    return on_top(n, bent_normal(table_at(material, INNER), where, stretch))
+    return on_top(n, bent_normal(table_at(material, INNER), where, way))
 
 
 @kernel

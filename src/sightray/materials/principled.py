@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -34,14 +35,19 @@ from sightray.materials.data import data, share_of
 from sightray.materials.dielectric import Boundary, boundary_of
 from sightray.materials.energy import missing_of_glass, missing_of_mirrors, passing, reflected_by_glass
 from sightray.materials.gloss import glossy, softened
+from sightray.materials.index import disperses, index_at, indices_at
 from sightray.materials.layers import COAT_INDEX, Layers, layers_value, sample_layers, schlick
 from sightray.materials.microfacet import GGX, facets
 from sightray.materials.sheen import sheen_table
+from sightray.mathlib.bands import hero_only
 from sightray.mathlib.frame import fresnel
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, grey, max4
+from sightray.spectra import WAVELENGTHS
 from sightray.textures.base import Where, texture_value, textured, value_at
+
+D_LINE, F_LINE, C_LINE = 587.56, 486.13, 656.27  # nm: between them Abbe's number measures dispersion
 
 
 class Principled(Material):
@@ -52,7 +58,8 @@ class Principled(Material):
     - a **base**: `metallic` of it is metal, GGX facets with Schlick's reflectance from `base_color` head-on to white;
       the rest is a dielectric of index `ior` that reflects colourlessly, `specular` times as much as Fresnel says, and
       below that `transmission` of it is clear, the others matte, both of `base_color`. All have the same `roughness`,
-      and with `anisotropy` above 0 highlights that are long along u, below 0 across it, as on brushed metal.
+      and with `anisotropy` above 0 highlights that are long along u, below 0 across it, as on brushed metal;
+      `anisotropy_rotation` turns that direction counter-clockwise.
     - a **sheen** of fibres of the colour `sheen` (`sheen.py`);
     - a **clear coat**, `clearcoat` times a varnish of index 1.5 with its own roughness.
 
@@ -62,10 +69,11 @@ class Principled(Material):
 
     What is clear bounds a closed body that bends light and is filled as in `Glass`; with `thin_walled` it is a sheet
     that light passes straight, blurred by the roughness. Sheen and coat lie on both sides; opaque parts look the same
-    from both sides.
+    from both sides. Where `dispersion` is stated, 20 over the Abbe number, spectral paths are bent by wavelength, with
+    Cauchy's n = a + b / wavelength² that is `ior` at the d line.
 
     References: Khronos Group, glTF 2.0, appendix B, and KHR_materials_{ior, specular, clearcoat, sheen, transmission,
-    volume}; B. Burley, "Physically based shading at Disney", SIGGRAPH 2012 course.
+    volume, anisotropy, dispersion}; B. Burley, "Physically based shading at Disney", SIGGRAPH 2012 course.
     """
 
     base_color: Any = textured("colour of metal, of matte, and of what light takes on when it passes", default=0.8,
@@ -73,7 +81,10 @@ class Principled(Material):
     metallic: Any = data("share of metal", default=0.0)
     roughness: Any = data("perceived roughness of the base", default=0.5)
     anisotropy: float = number("how much that depends on the direction", default=0.0, at_least=-1, at_most=1)
+    anisotropy_rotation: float = number("of its direction from u, counter-clockwise", default=0.0, unit="degrees")
     ior: float = number("refractive index of the dielectric", default=1.5, at_least=1)
+    dispersion: float = number("20 over the Abbe number of what is clear; 0: all wavelengths alike", default=0.0,
+                               at_least=0)  # fmt: skip
     specular: Any = data("factor on what the opaque dielectric reflects colourlessly", default=1.0)
     clearcoat: Any = data("strength of the clear coat", default=0.0)
     clearcoat_roughness: Any = data("its perceived roughness", default=0.0)
@@ -99,6 +110,10 @@ class Principled(Material):
     _enters: Any = derived_number("share of light from all sides that enters",
                                   lambda p: passing(p.ior)[0])  # fmt: skip
     _leaves: Any = derived_number("and that leaves", lambda p: passing(p.ior)[1])
+    _turn: Any = derived_vector("cosine and sine of the rotation", lambda p: (
+        math.cos(math.radians(p.anisotropy_rotation)), math.sin(math.radians(p.anisotropy_rotation)), 0.0))  # fmt: skip
+    _index: Any = derived_number("refractive index at the d line", lambda p: p.ior)
+    _indices: Any = derived_array("and by wavelength, if it differs; read as the word behind", lambda p: p.indices())
 
     def check(self) -> None:
         """Refuse absorption beside a medium."""
@@ -122,6 +137,17 @@ class Principled(Material):
             return self.emission.brightness()
         return sum(self.emission) / 3
 
+    @property
+    def painted_glow(self) -> Any:
+        return None if isinstance(self.emission, tuple) else self.emission
+
+    def indices(self) -> Any:
+        """The refractive index at `WAVELENGTHS`, (471,), or None; at least 1."""
+        if not (self.dispersion > 0.0 and _there(self.transmission)) or self.thin_walled:
+            return None
+        b = (self.ior - 1.0) * self.dispersion / 20.0 / (F_LINE**-2 - C_LINE**-2)
+        return np.maximum(1.0, self.ior + b * (WAVELENGTHS**-2.0 - D_LINE**-2))
+
     def inside(self) -> Any:
         """The medium inside, or None; sheets have none, and neither have opaque bodies."""
         return None if self.thin_walled or not _there(self.transmission) else medium_inside(self)
@@ -143,18 +169,18 @@ def _there(value: Any) -> bool:
 
 
 (
-    BASE_COLOR, METALLIC, ROUGHNESS, ANISOTROPY, IOR, SPECULAR, CLEARCOAT, CLEARCOAT_ROUGHNESS, SHEEN,
+    BASE_COLOR, METALLIC, ROUGHNESS, ANISOTROPY, _, IOR, _, SPECULAR, CLEARCOAT, CLEARCOAT_ROUGHNESS, SHEEN,
     SHEEN_ROUGHNESS, TRANSMISSION, THIN_WALLED, ABSORPTION, EMISSION, INSIDE, STAIN, METAL_TABLE, VARNISH_TABLE,
-    COAT_TABLE, SHEEN_TABLE, GLASS_OUT, GLASS_IN, ENTERS, LEAVES,
+    COAT_TABLE, SHEEN_TABLE, GLASS_OUT, GLASS_IN, ENTERS, LEAVES, TURN, INDEX, _,
 ) = Principled.offsets()  # fmt: skip
 SMOOTHEST = 0.0316  # roughness, for an alpha of 0.001: like a mirror, but lights without extent show in it
 
 
 @kernel
-def boundary_seen(material: Table, roughness: f64, outside: bool) -> Boundary:
+def boundary_seen(material: Table, bands: Table, roughness: f64, outside: bool) -> Boundary:
     """The boundary of a clear body from the viewer's side; for others, one that is never asked."""
     out, within = table_at(material, GLASS_OUT), table_at(material, GLASS_IN)
-    shape, ior = facets(GGX, roughness, f64_at(material, ANISOTROPY)), f64_at(material, IOR)
+    shape, ior = facets(GGX, roughness, f64_at(material, ANISOTROPY)), index_at(material, INDEX, bands)
     if is_null(out):
         return Boundary(shape, roughness, 1.0 / ior, out, within, 0.0)
     if outside:
@@ -169,6 +195,7 @@ def layers_of(material: Table, where: Where, outside: bool) -> Layers:
     dielectric = 1.0 - share_of(table_at(material, METALLIC), where)
     clear = dielectric * share_of(table_at(material, TRANSMISSION), where)
     coat, fibres = table_at(material, COAT_TABLE), table_at(material, SHEEN_TABLE)
+    iors = indices_at(material, INDEX, where.bands)
     return Layers(
         value_at(table_at(material, BASE_COLOR), where),
         1.0 - dielectric,
@@ -176,7 +203,9 @@ def layers_of(material: Table, where: Where, outside: bool) -> Layers:
         clear,
         share_of(table_at(material, SPECULAR), where),
         1.0 / f64_at(material, IOR),
-        boundary_seen(material, roughness, outside),
+        boundary_seen(material, where.bands, roughness, outside),
+        iors if outside else 1.0 / iors,
+        disperses(material, INDEX, where.bands),
         i64_at(material, THIN_WALLED) != 0,
         1.0 - f64_at(material, ENTERS),
         0.0 if is_null(coat) else share_of(table_at(material, CLEARCOAT), where),
@@ -190,17 +219,34 @@ def layers_of(material: Table, where: Where, outside: bool) -> Layers:
     )
 
 
+@kernel
+def along_grain(material: Table, w: Vec3) -> Vec3:
+    """A direction in the frame whose x is the direction of the anisotropy."""
+    turn = vec3_at(material, TURN)
+    return Vec3(turn.x * w.x + turn.y * w.y, turn.x * w.y - turn.y * w.x, w.z)
+
+
+@kernel
+def across_grain(material: Table, w: Vec3) -> Vec3:
+    """A direction out of that frame again."""
+    turn = vec3_at(material, TURN)
+    return Vec3(turn.x * w.x - turn.y * w.y, turn.x * w.y + turn.y * w.x, w.z)
+
+
 @implements(sample_bsdf, Principled)
 def sample_principled(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice: f64) -> BsdfSample:
     side = 1.0 if wo.z > 0.0 else -1.0
     layers = layers_of(material, where, wo.z > 0.0)
-    o = Vec3(wo.x, wo.y, wo.z * side)
+    o = along_grain(material, Vec3(wo.x, wo.y, wo.z * side))
     i = sample_layers(layers, o, u, v, choice)
     if i.z == 0.0:
         return BsdfSample(wo, grey(0.0), 0.0)
     found = layers_value(layers, where.bands, o, i)
     if not found.density > 0.0:  # seen exactly along the surface
         return BsdfSample(wo, grey(0.0), 0.0)
+    if i.z < 0.0 and layers.parted:
+        hero_only(where.bands)
+    i = across_grain(material, i)
     return BsdfSample(Vec3(i.x, i.y, i.z * side), found.value / found.density, found.density)
 
 
@@ -210,7 +256,8 @@ def bsdf_of_principled(material: Table, where: Where, wo: Vec3, wi: Vec3) -> Bsd
         return BsdfValue(grey(0.0), 0.0)
     side = 1.0 if wo.z > 0.0 else -1.0
     layers = layers_of(material, where, wo.z > 0.0)
-    return layers_value(layers, where.bands, Vec3(wo.x, wo.y, wo.z * side), Vec3(wi.x, wi.y, wi.z * side))
+    o, i = Vec3(wo.x, wo.y, wo.z * side), Vec3(wi.x, wi.y, wi.z * side)
+    return layers_value(layers, where.bands, along_grain(material, o), along_grain(material, i))
 
 
 @implements(local, Principled)

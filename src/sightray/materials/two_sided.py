@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sightray._jit import implements, kernel
-from sightray.fields import child
+from sightray.fields import child, derived_child
 from sightray.materials.base import (
     BsdfSample,
     BsdfValue,
@@ -16,6 +16,7 @@ from sightray.materials.base import (
     local,
     sample_bsdf,
 )
+from sightray.materials.mix import lone_lamp
 from sightray.materials.wrapper import INNER, _Wrapper
 from sightray.mathlib.bands import as_light
 from sightray.mathlib.scalars import f64
@@ -28,10 +29,16 @@ class TwoSided(_Wrapper):
     """Shows `material` on the outer side of a surface and `back` on the inner one; without a `back`, the same on both.
 
     Either side answers as it would from outside, lamps glow on both sides. It is meant for opaque materials: what lets
-    light through already knows which side is which. Holes and relief are those of `material`.
+    light through already knows which side is which. Holes and relief are those of `material`. A lamp keeps its
+    spectrum; if the sides are two different lamps, their light is up-sampled from its colour.
     """
 
     back: Any = child("what the inner side is made of; None for the same", "materials", default=None, optional=True)
+    _lamp: Any = derived_child("what glows, if it is one material", lambda t: t.lamp())
+
+    def lamp(self) -> Any:
+        """The material that glows; None if both sides do, each in its own way."""
+        return self.material if self.back is None else lone_lamp(self.material, self.back)
 
     @property
     def oriented(self) -> bool:
@@ -42,7 +49,7 @@ class TwoSided(_Wrapper):
         return max(self.material.glow, 0.0 if self.back is None else self.back.glow)
 
 
-_, BACK = TwoSided.offsets()
+_, BACK, LAMP = TwoSided.offsets()
 
 
 @kernel
@@ -81,4 +88,5 @@ def emitted_by_two_sided(material: Table, where: Where, cos_view: f64) -> Vec3:
 
 @implements(glow_in_lanes, TwoSided)
 def glow_of_either_side(material: Table, bands: Table, rgb: Vec3) -> Vec3:
-    return as_light(bands, rgb)
+    lamp = table_at(material, LAMP)
+    return as_light(bands, rgb) if is_null(lamp) else glow_in_lanes(lamp, bands, rgb)

@@ -11,6 +11,7 @@ from sightray.materials.base import (
     BsdfValue,
     Local,
     Material,
+    Way,
     bent_normal,
     bsdf,
     emitted,
@@ -59,6 +60,10 @@ class _Wrapper(Material):
     def glow(self) -> float:
         return self.material.glow
 
+    @property
+    def painted_glow(self) -> Any:
+        return self.material.painted_glow
+
 
 (INNER,) = _Wrapper.offsets()
 
@@ -99,5 +104,5 @@ def opacity_within(material: Table, where: Where) -> f64:
 
 
 @implements(bent_normal, _Wrapper)
-def bent_normal_within(material: Table, where: Where, stretch: f64) -> Vec3:
-    return bent_normal(table_at(material, INNER), where, stretch)
+def bent_normal_within(material: Table, where: Where, way: Way) -> Vec3:
+    return bent_normal(table_at(material, INNER), where, way)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from sightray.media.base import (
     sample_phase,
     transmittance,
 )
+from sightray.media.grid_files import read_densities
 from sightray.media.henyey_greenstein import henyey_greenstein, sample_henyey_greenstein
 from sightray.samplers.base import Draws
 
@@ -32,11 +34,13 @@ MOST_STEPS = 100_000  # through one medium; a way that takes more is as good as 
 
 
 def _density(value: Any) -> np.ndarray:
-    """A read-only (nz, ny, nx) float32 array of densities."""
+    """A read-only (nz, ny, nx) float32 array of densities, from an array or a file."""
+    if isinstance(value, str | os.PathLike):
+        value = read_densities(value)
     try:
         found = np.array(value, np.float32)
     except (TypeError, ValueError):
-        raise SceneError("got no array; allowed: densities of shape (nz, ny, nx)") from None
+        raise SceneError("got no array; allowed: densities of shape (nz, ny, nx), or a file of them") from None
     if found.ndim != 3 or not found.size or not np.isfinite(found).all() or (found < 0).any():
         raise SceneError(
             f"got an array of shape {found.shape}; allowed: shape (nz, ny, nx), finite densities of at least 0"
@@ -53,9 +57,13 @@ class GridMedium(Medium):
     (P. Kutz, R. Habel, Y. Li, J. Novák, "Spectral and decomposition tracking", SIGGRAPH 2017); transmittance by ratio
     tracking (J. Novák, A. Selle, W. Jarosz, SIGGRAPH Asia 2014). Both are unbiased. A thin medium with one dense spot
     takes many steps.
+
+    Densities are an array, or a file: ``.npy``, or ``.vol`` as Mitsuba stores grids. The box is `lower` to `upper` in
+    either case.
     """
 
-    density: Any = other("densities, (nz, ny, nx) floats; x is the last axis", _density, plain=lambda d: d.tolist())
+    density: Any = other("densities, (nz, ny, nx) floats, x being the last axis; or a .npy or .vol file", _density,
+                         plain=lambda d: d.tolist())  # fmt: skip
     lower: Point = vector("corner of the grid's box", default=(0.0, 0.0, 0.0), unit="m")
     upper: Point = vector("opposite corner", default=(1.0, 1.0, 1.0), unit="m")
     transform: Transform = other(

@@ -26,7 +26,7 @@ from sightray.accelerators.item import FLAGS as ITEM_FLAGS
 from sightray.bvh.bvh8 import int_at
 from sightray.cameras.base import APART, SPREAD
 from sightray.lights.base import sky
-from sightray.materials.base import bent_normal, opacity
+from sightray.materials.base import Way, bent_normal, opacity
 from sightray.mathlib.rng import stream, uniform
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, no_table, table_at, vec3_at
@@ -146,14 +146,23 @@ def point_of(world: Table, hit: ItemHit, o: Vec3, d: Vec3, beam: Beam) -> Point:
         inner = Vec3(inner.x, inner.y, inner.z, reach * object_scale(item, s.tangent))
         where = Where(s.u, s.v, p_object, inner, width, beam.bands)
         if flags & BUMPY != 0:
-            tilted = bent_normal(material, where, stretch)
-            if is_mirrored(item, hit.prim):
+            mirrored = is_mirrored(item, hit.prim)
+            across = cross(n, s.tangent) * (-1.0 if mirrored else 1.0)
+            along = moved_in_object(item, p, p_object, s.tangent)
+            tilted = bent_normal(material, where, Way(stretch, along, moved_in_object(item, p, p_object, across)))
+            if mirrored:
                 tilted = Vec3(tilted.x, -tilted.y, tilted.z)
             shading = bent(shading, s.tangent, tilted)
     light = i64_at(item, LIGHT) + i64_at(item, LIGHT_STEP) * hit.prim
     return Point(
         p, n, shading, -dot(shading, d), material, where, light, s.tangent, flags,
     )  # fmt: skip
+
+
+@kernel
+def moved_in_object(item: Table, p: Vec3, p_object: Vec3, way: Vec3) -> Vec3:
+    """How a way from p in the world goes in the item's object space."""
+    return to_object(item, Vec3(p.x + way.x, p.y + way.y, p.z + way.z, p.w)) - p_object
 
 
 @kernel

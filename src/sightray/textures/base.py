@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from sightray._jit import implements, kernel, method
 from sightray.errors import SceneError
 from sightray.fields import REQUIRED, Child, ColorField, Packer
@@ -44,6 +46,13 @@ class Texture(Member, family="textures"):
         """
         stated = [value for name, value in self.values().items() if isinstance(self.given[name], Textured)]
         return mean_brightness([value for value in stated if value is not None])
+
+    def brightness_over(self, corners: np.ndarray) -> np.ndarray:
+        """The same over each of n triangles of texture coordinates, (n, 3, 2): (n,) float64, for choosing among them.
+
+        Unless a member knows better it is alike everywhere.
+        """
+        return np.full(len(corners), self.brightness())
 
 
 @method(0)
@@ -96,9 +105,10 @@ class Textured(Child):
     """A colour or a texture; kernels always see a texture."""
 
     def __init__(
-        self, doc: str, default: Any = REQUIRED, *, at_most: float = float("inf"), optional: bool = False
+        self, doc: str, default: Any = REQUIRED, *, at_most: float = float("inf"), optional: bool = False,
+        packed: bool = True,
     ):  # fmt: skip
-        super().__init__(doc, "textures", default, optional=optional)
+        super().__init__(doc, "textures", default, optional=optional, packed=packed)
         self._color = ColorField(doc, at_most=at_most)
 
     def convert(self, value: Any) -> Any:
@@ -125,7 +135,7 @@ class Textured(Child):
 
 
 def textured(
-    doc: str, default: Any = REQUIRED, *, at_most: float = float("inf"), optional: bool = False
+    doc: str, default: Any = REQUIRED, *, at_most: float = float("inf"), optional: bool = False, packed: bool = True
 ) -> Any:  # fmt: skip
-    """A linear colour, or a texture that gives one."""
-    return Textured(doc, default, at_most=at_most, optional=optional)
+    """A linear colour, or a texture that gives one; kernels do not see it if it is not `packed`."""
+    return Textured(doc, default, at_most=at_most, optional=optional, packed=packed)

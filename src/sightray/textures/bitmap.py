@@ -16,7 +16,7 @@ from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f32_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3
 from sightray.textures.base import Texture, Where, texture_value
-from sightray.textures.pyramid import pyramid
+from sightray.textures.pyramid import means_over, pyramid
 
 NEAREST, BILINEAR, TRILINEAR = 0, 1, 2
 REPEAT, CLAMP, MIRROR = 0, 1, 2
@@ -91,6 +91,9 @@ class Bitmap(Texture):
 
     def brightness(self) -> float:
         return float(self.pixels.mean())
+
+    def brightness_over(self, corners: np.ndarray) -> np.ndarray:
+        return means_over(self.pixels.mean(axis=2, keepdims=True), corners * self.scale + self.offset, self.wrap)
 
     def as_numbers(self) -> Bitmap:
         return self.replace(linear=True) if isinstance(self.image, Path) and not self.linear else self

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from sightray._jit import implements
 from sightray.mathlib.table import Table, table_at
 from sightray.mathlib.vec import Vec3
@@ -18,6 +20,10 @@ class Multiply(Texture):
 
     def brightness(self) -> float:
         return mean_brightness([self.a]) * mean_brightness([self.b])
+
+    def brightness_over(self, corners: np.ndarray) -> np.ndarray:
+        a, b = (f.brightness_over(corners) if isinstance(f, Texture) else sum(f) / len(f) for f in (self.a, self.b))
+        return np.asarray(a * b, np.float64) + np.zeros(len(corners))
 
 
 A, B = Multiply.offsets()

@@ -35,6 +35,12 @@ class UvTransform(Texture):
         turn = np.array([[c, -s], [s, c]])
         return np.column_stack([turn * np.array(self.scale), np.array(self.offset)])
 
+    def brightness_over(self, corners: np.ndarray) -> np.ndarray:
+        if not isinstance(self.texture, Texture):
+            return super().brightness_over(corners)
+        rows = self.rows()
+        return self.texture.brightness_over(corners @ rows[:, :2].T + rows[:, 2])
+
 
 TEXTURE, _, U, V = UvTransform.offsets()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 
 import numpy as np
@@ -190,6 +191,20 @@ def test_pairs_know_nothing_of_one_another(name, what):
             assert abs(z) < 4.5, (i, j, z)
             if name != "HaltonSampler" or what != "dimension":  # whose dimensions are spread together on purpose
                 assert 0.85 < products.var() * n < 1.8, (i, j)
+
+
+@pytest.mark.parametrize(("one", "other"), [((1, 7), (1, 15)), ((1, 3), (1, 7)), ((0, 15), (1, 15)), ((2, 0), (40, 0))])
+def test_late_dimensions_of_halton_make_no_stripes(one, other):
+    """Bands along the diagonals of two dimensions get their share of samples, no less surely than by chance.
+
+    Linearly scrambled digits of large primes fail: for few samples their pairs are lattices, 5.5 times as uncertain.
+    """
+    n = 1024
+    a, b = (drawn("HaltonSampler", n, width=20, height=20, level=level, dimension=d) for level, d in (one, other))
+    for i, j in itertools.product((0, 1), repeat=2):
+        for sign in (1, -1):
+            share = ((a[..., i] + sign * b[..., j]) % 1 < 0.5).mean(axis=-1)
+            assert 4 * n * ((share - 0.5) ** 2).mean() < 1.6, (i, j, sign)
 
 
 def smooth(points):

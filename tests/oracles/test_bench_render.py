@@ -11,7 +11,7 @@ import pytest
 
 import sightray as sr
 from sightray.cli import bench_cycles, bench_render
-from sightray.cli.cycles_scene import TURN, write_cycles_scene
+from sightray.cli.cycles_scene import FEW_LAMPS, TURN, write_cycles_scene
 from sightray.errors import UnsupportedError
 
 
@@ -65,6 +65,23 @@ def test_cycles_gets_the_scene_as_it_is(tmp_path):
     # The camera looks along -z, y upwards.
     pose = np.linalg.inv(TURN) @ told["camera"]["pose"]
     np.testing.assert_allclose(pose[:3], [[1, 0, 0, 0], [0, 1, 0, 1], [0, 0, 1, 5]], atol=1e-12)
+
+
+def test_many_lamps_are_surfaces_that_glow(tmp_path):
+    """Each with its own colour, facing as the lamp does, and with a black back behind it."""
+    rng = np.random.default_rng(2)
+    lamps = [sr.RectangleLight(corner=rng.normal(size=3), edge_u=(0.1, 0, 0), edge_v=(0, 0.1, 0.1), radiance=rng.random(3))
+             for _ in range(FEW_LAMPS + 1)]  # fmt: skip
+    told, arrays = written(sr.Scene(*lamps, camera=sr.PerspectiveCamera()), tmp_path / "scene.npz")
+    assert told["lights"] == []
+    backs = arrays[told["meshes"][-1]["vertices"]].reshape(-1, 4, 3)
+    assert told["materials"][told["meshes"][-1]["material"]]["color"] == [0, 0, 0]
+    for k, lamp in enumerate(lamps):
+        glow, corners = told["materials"][told["meshes"][k]["material"]], arrays[told["meshes"][k]["vertices"]]
+        assert glow == {"kind": "Emitter", "color": list(lamp.radiance)}
+        assert told["objects"][k] == {"mesh": k, "pose": TURN.tolist()}
+        np.testing.assert_allclose(np.cross(corners[1] - corners[0], corners[3] - corners[0]), lamp.area_vector())
+        np.testing.assert_allclose((backs[k] - corners) @ lamp.area_vector() / lamp.area, -2e-5)
 
 
 def test_a_sky_is_seen_where_it_is(tmp_path):

@@ -54,6 +54,8 @@ class ErrorDriven(NamedTuple):
         first = min(FIRST, self.samples)
         if reached is None or reached.min() < first:
             return Uniform(first, open_ended=True).next(film, reached)
+        if first < 2:  # a single sample tells nothing of its error
+            return None
         pixels = reached.size
         so_far = int(reached.sum(dtype=np.int64))
         wanted = min(GROWTH * so_far, float(self.samples) * pixels)

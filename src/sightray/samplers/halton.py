@@ -12,9 +12,10 @@ from sightray.mathlib.digits import LOW, reverse_bits, scramble_reversed, shuffl
 from sightray.mathlib.rng import uniform, word
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, table_at
-from sightray.samplers.base import BLOCK, Draws, Pair, Sampler, draw
+from sightray.samplers.base import Draws, Pair, Sampler, draw
 
-PRIMES = np.array([p for p in range(2, 132) if all(p % q for q in range(2, p))][: 2 * BLOCK], np.int64)
+GROUP = 4  # pairs that are spread together: with larger primes, too few samples make lattices of their pairs
+PRIMES = np.array([p for p in range(2, 20) if all(p % q for q in range(2, p))], np.int64)
 RUN = 4096  # samples whose order is shuffled; as many digits are scrambled as number them
 
 
@@ -22,13 +23,14 @@ class HaltonSampler(Sampler):
     """Every dimension is a van der Corput sequence in a base of its own, the primes from 2 on.
 
     Coordinate k of sample i mirrors the digits of i in base p_k at the point: 0.d0 d1 d2 ... (J. H. Halton, Numerische
-    Mathematik 2, 1960). All dimensions of a bounce are evenly spread *together*, which pairs of `SobolSampler` are not;
+    Mathematik 2, 1960). Eight dimensions of a bounce are evenly spread *together*, which pairs of `SobolSampler` are not;
     but the higher the prime, the more samples that takes. Each digit d becomes (a d + c) mod p with random a and c of
-    its place (J. Matousek, "On the L2-discrepancy for anchored boxes", J. Complexity 14, 1998). Every bounce starts
-    with 2 and 3 again, over a shuffled order of the samples, so that deep paths do not get large primes.
+    its place (J. Matousek, "On the L2-discrepancy for anchored boxes", J. Complexity 14, 1998). After eight
+    dimensions primes start with 2 and 3 again, over a shuffled order of the samples, which knows nothing of the others; so
+    there are no large primes, of which few samples would show stripes, however many dimensions a path has.
     """
 
-    _primes: Any = derived_array("one prime for every dimension of a bounce", lambda sampler: PRIMES)
+    _primes: Any = derived_array("one prime for each of the dimensions that belong together", lambda sampler: PRIMES)
 
 
 (PRIMES_AT,) = HaltonSampler.offsets()
@@ -36,8 +38,8 @@ class HaltonSampler(Sampler):
 
 @implements(draw, HaltonSampler)
 def draw_halton(sampler: Table, draws: Draws, dimension: i64) -> Pair:
-    block, axis = dimension // BLOCK, dimension % BLOCK
-    order = shuffled(draws.sample, word(draws.key, -1 - block) & LOW)
+    group, axis = dimension // GROUP, dimension % GROUP
+    order = shuffled(draws.sample, word(draws.key, -1 - group) & LOW)
     index = draws.sample // RUN * RUN + order % RUN
     primes = table_at(sampler, PRIMES_AT)
     a, b = word(draws.key, 2 * dimension), word(draws.key, 2 * dimension + 1)

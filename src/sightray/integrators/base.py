@@ -12,7 +12,6 @@ from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
 from sightray.samplers.base import Draws
 
-MOST_TOGETHER = 64  # rays of a group
 # Words of a ray in a group: the ray, the light that it is found to bring, its draws, and the brightest channel of the
 # pixel so far, 0 in the beginning; two are left to the caller.
 _ORIGIN, _DIRECTION, COLOR, _SAMPLER, _DRAWS, SO_FAR, MINE = 0, 4, 8, 12, 13, 18, 19

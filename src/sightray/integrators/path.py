@@ -226,8 +226,14 @@ def given_off(world: Table, point: Point, start: Vec3, n: Vec3, d: Vec3, gone: f
 @kernel
 def is_matte(point: Point) -> bool:
     """Whether a surface answers light from all around on the side that is seen; mirrors do not."""
+    return sent_back(point) > MATTE
+
+
+@kernel
+def sent_back(point: Point) -> f64:
+    """The density, per steradian, with which a surface sends light that meets it head on back: 1/pi of a matte one."""
     side = Vec3(0.0, 0.0, 1.0 if point.cos_view >= 0.0 else -1.0)
-    return bsdf(point.material, point.where, side, side).density > MATTE
+    return bsdf(point.material, point.where, side, side).density
 
 
 @kernel

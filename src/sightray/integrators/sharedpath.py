@@ -23,6 +23,7 @@ from sightray.integrators.path import (
     given_off,
     limited,
     onward,
+    sent_back,
     survival,
     walk,
 )
@@ -217,7 +218,7 @@ def go_on(
     rays = met.rays
     if met.hit.item >= 0:
         y = turn_at(world, met.hit, met.step, draws)
-        if not is_narrow(y.point):
+        if sent_back(y.point) <= NARROW:
             return at_matte(integrator, world, met.hit, met.step, y, weight, enough, draws, second)
         met = walk(integrator, world, step, draws, 0)
         rays += met.rays
@@ -279,13 +280,6 @@ def at_matte(
     vec3_put(second, ONWARD, y.chosen.wi)
     vec3_put(second, FOUND, went)
     return Radiance(color, rays)
-
-
-@kernel
-def is_narrow(point: Point) -> bool:
-    """Whether a surface is so shiny that what it sends to one place says little of what it sends to another."""
-    side = Vec3(0.0, 0.0, 1.0 if point.cos_view >= 0.0 else -1.0)
-    return bsdf(point.material, point.where, side, side).density > NARROW
 
 
 @kernel

@@ -74,7 +74,7 @@ from sightray.mathlib.table import (
     table_at,
 )
 from sightray.mathlib.tally import TESTS, tally
-from sightray.mathlib.vec import Vec3
+from sightray.mathlib.vec import Vec3, rounded_cross, rounded_product
 
 BLOCK_FLOATS, EDGES, INDICES = 48, 12, 36
 
@@ -277,13 +277,13 @@ def corners(vertices: Table, blocks: Table, at: i64, axis: i64) -> Vec3:
 @kernel(exact=True)
 def edge_functions(x: Vec3, y: Vec3) -> Vec3:
     """On which side of each edge the origin lies; for a shared edge exactly opposite to what its other triangle finds."""
-    return Vec3(x.z * y.y - y.z * x.y, x.x * y.z - y.x * x.z, x.y * y.x - y.y * x.x)
+    return rounded_cross(y, x)
 
 
 @kernel(exact=True)
 def times(a: Vec3, factor: f64) -> Vec3:
     """a * factor, rounded before anything is added: single rays and packets shall find the same to the last bit."""
-    return Vec3(a.x * factor, a.y * factor, a.z * factor)
+    return rounded_product(a, factor)
 
 
 @kernel(exact=True)
@@ -297,15 +297,22 @@ def meet_triangle(mesh: Table, block: i64, lane: i64, o: Vec3, s: Shear, t_min: 
     """The hit of the triangle in one lane of a block, decided in double precision (Woop, Benthin and Wald, 2013)."""
     vertices, blocks, at = table_at(mesh, VERTICES), table_at(mesh, BLOCKS), block * BLOCK_FLOATS + INDICES + lane
     z = corners(vertices, blocks, at, s.kz) - axis_of(o, s.kz)
-    x = corners(vertices, blocks, at, s.kx) - axis_of(o, s.kx) - times(z, s.sx)
-    y = corners(vertices, blocks, at, s.ky) - axis_of(o, s.ky) - times(z, s.sy)
+    x = corners(vertices, blocks, at, s.kx) - axis_of(o, s.kx)
+    y = corners(vertices, blocks, at, s.ky) - axis_of(o, s.ky)
+    return decide(int_at(table_at(mesh, NUMBERS), 4 * block + lane), x, y, z, s, t_min, t_max)
+
+
+@kernel
+def decide(number: i64, x: Vec3, y: Vec3, z: Vec3, s: Shear, t_min: f64, t_max: f64) -> Hit:
+    """Whether a ray meets the triangle of this number, from its corners' coordinates as seen from the ray's origin."""
+    x, y = x - times(z, s.sx), y - times(z, s.sy)
     e = edge_functions(x, y)
     det = e.x + e.y + e.z
     if (min(e.x, e.y, e.z) < 0.0 and max(e.x, e.y, e.z) > 0.0) or det == 0.0:
         return miss()
     t = depth_of(e, z, s.sz, det)
     if t_min < t < t_max:
-        return Hit(t, int_at(table_at(mesh, NUMBERS), 4 * block + lane), e.y / det, e.z / det)
+        return Hit(t, number, e.y / det, e.z / det)
     return miss()
 
 

@@ -87,6 +87,18 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 
 
 @primitive
+def rounded_product(a: Vec3, factor: f64) -> Vec3:
+    """a * factor; in an exact kernel it is rounded before anything is added to it."""
+    return a * factor
+
+
+@primitive
+def rounded_cross(a: Vec3, b: Vec3) -> Vec3:
+    """`cross`; in an exact kernel of rounded products, and so exactly opposite with `a` and `b` exchanged."""
+    return cross(a, b)
+
+
+@primitive
 def length(a: Vec3) -> f64:
     """Euclidean norm of the first three lanes."""
     return math.sqrt(dot(a, a))

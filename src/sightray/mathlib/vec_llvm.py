@@ -143,12 +143,23 @@ def dot(builder: Any, a: Any, b: Any) -> Any:
     return builder.fadd(xy, lane(builder, p, 2), flags=FLAGS)
 
 
-@lower(vec.cross)
-def cross(builder: Any, a: Any, b: Any) -> Any:
-    turn = [1, 2, 0, 3]
-    left = builder.fmul(a, shuffle(builder, b, turn), flags=FLAGS)
-    right = builder.fmul(shuffle(builder, a, turn), b, flags=FLAGS)
-    return shuffle(builder, builder.fsub(left, right, flags=FLAGS), turn)
+def _cross(flags: tuple[str, ...]) -> Any:
+    def emit(builder: Any, a: Any, b: Any) -> Any:
+        turn = [1, 2, 0, 3]
+        left = builder.fmul(a, shuffle(builder, b, turn), flags=flags)
+        right = builder.fmul(shuffle(builder, a, turn), b, flags=flags)
+        return shuffle(builder, builder.fsub(left, right, flags=flags), turn)
+
+    return emit
+
+
+lower(vec.cross)(_cross(FLAGS))
+lower(vec.rounded_cross)(_cross(()))
+
+
+@lower(vec.rounded_product)
+def rounded_product(builder: Any, a: Any, factor: Any) -> Any:
+    return builder.fmul(a, splat(builder, factor))
 
 
 @lower(vec.length)

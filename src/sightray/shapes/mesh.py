@@ -8,15 +8,9 @@ from typing import Any
 import numpy as np
 
 from sightray._jit import METHOD_SLOTS, implements, kernel
+from sightray.bvh.few import FEW_WORDS, any_in_mesh, closest_in_mesh, pack_few
 from sightray.bvh.refit import expected_cost, refit_mesh
-from sightray.bvh.triangles import (
-    MESH_WORDS,
-    MeshTree,
-    any_triangle,
-    build_mesh,
-    closest_triangle,
-    pack_mesh,
-)
+from sightray.bvh.triangles import MeshTree, build_mesh, pack_mesh
 from sightray.errors import SceneError
 from sightray.fields import REQUIRED, Derived, Field, array
 from sightray.mathlib.hit import Hit
@@ -32,10 +26,11 @@ _SLIVER = 1e-15  # twice the area over the longest edge squared, up to which thr
 class _TreeHead(Field):
     """The words in front of a mesh's row that rays read: the tree, its blocks, the triangles."""
 
-    words = MESH_WORDS - METHOD_SLOTS
+    words = FEW_WORDS - METHOD_SLOTS
 
     def pack(self, row: Table, word: int, value: Any, packer: Any) -> None:
         pack_mesh(packer.space, row, value)
+        pack_few(packer.space, row, value)
 
 
 class Mesh(Shape):
@@ -170,8 +165,8 @@ class Mesh(Shape):
 TREE_HEAD, VERTICES_GIVEN, FACES_GIVEN, NORMALS, UVS = Mesh.offsets()
 assert TREE_HEAD == METHOD_SLOTS, "the tree must stand first in a mesh's row"
 
-implements(intersect, Mesh)(closest_triangle)
-implements(occluded, Mesh)(any_triangle)
+implements(intersect, Mesh)(closest_in_mesh)
+implements(occluded, Mesh)(any_in_mesh)
 
 
 @kernel

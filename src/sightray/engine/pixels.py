@@ -27,7 +27,6 @@ from sightray.mathlib.vec import dot, grey
 from sightray.samplers.base import Draws, Pair, begin, nested, number, pair
 from sightray.scene.world import CAMERA
 
-MOST = 1 << 62
 WIDEST = 2  # most pixels from one of a lattice to the next: neighbours are more alike, but wider ones make no squares
 # Dimensions of a sample's draws that the engine takes; integrators have draws of their own.
 PLACE, LENS, TIME = 0, 1, 2
@@ -113,30 +112,31 @@ def render_tile_in_groups(
     """The same, for integrators that want the rays of near pixels: square lattices of `together` by `together` of them.
 
     The lattices lie elsewhere for each sample and are as wide as chance will have it, so that none shows in the picture;
-    at the edges of the tile they are cut.
+    at the edges of the tile they are cut. Where some pixels are to have more samples than others, they begin, so that all
+    go together in the end.
     """
-    rays = 0
-    first, last = MOST, 0
+    rays, most, last = 0, 0, 0
     for y in range(y0, y1):
         for x in range(x0, x1):
-            first = min(first, samples_taken(film, y * width + x))
-            last = max(last, i64(i32_at(target, y * width + x)))
-    for s in range(first, last):
-        lattice = word(stream(seed, s), 0) & LOW
+            pixel = y * width + x
+            goal = i64(i32_at(target, pixel))
+            most, last = max(most, goal - samples_taken(film, pixel)), max(last, goal)
+    for left in range(most, 0, -1):
+        lattice = word(stream(seed, last - left), 0) & LOW
         across, down = 1 + (lattice & 255) % WIDEST, 1 + (lattice >> 8 & 255) % WIDEST
         top = y0 - (lattice >> 16 & 255) % (together * down)
         while top < y1:
-            left = x0 - (lattice >> 24) % (together * across)
-            while left < x1:
+            side = x0 - (lattice >> 24) % (together * across)
+            while side < x1:
                 for k in range(across * down):
                     if i64_at(stop, 0) != 0:
                         return rays
-                    here = Lattice(left + k % across, top + k // across, across, down, together)
+                    here = Lattice(side + k % across, top + k // across, across, down, together)
                     rays += render_group(
-                        world, integrator, sampler, film, filters, target, here, x0, y0, x1, y1, width, s, expected,
+                        world, integrator, sampler, film, filters, target, here, x0, y0, x1, y1, width, left, expected,
                         centred, seed,
                     )  # fmt: skip
-                left += together * across
+                side += together * across
             top += together * down
     return rays
 
@@ -144,9 +144,9 @@ def render_tile_in_groups(
 @kernel
 def render_group(
     world: Table, integrator: Table, sampler: Table, film: Table, filters: Table, target: Table, lattice: Lattice,
-    x0: i64, y0: i64, x1: i64, y1: i64, width: i64, s: i64, expected: i64, centred: i64, seed: i64,
+    x0: i64, y0: i64, x1: i64, y1: i64, width: i64, left: i64, expected: i64, centred: i64, seed: i64,
 ) -> i64:  # fmt: skip
-    """Take sample s of those pixels of a lattice within the tile that are to have it and have it not; how many rays."""
+    """Take a sample of those pixels of a lattice within the tile that have `left` to take; how many rays."""
     sights, count = scratch(1536), 0  # 64 rays
     for j in range(lattice.together):
         for i in range(lattice.together):
@@ -154,7 +154,8 @@ def render_group(
             if x < x0 or x >= x1 or y < y0 or y >= y1:
                 continue
             pixel = y * width + x
-            if samples_taken(film, pixel) != s or s >= i64(i32_at(target, pixel)):
+            s = samples_taken(film, pixel)
+            if i64(i32_at(target, pixel)) - s != left:
                 continue
             at = aim(world, sampler, filters, x, y, s, expected, centred, seed)
             if not dot(at.ray.direction, at.ray.direction) > 0.0:  # see `look`

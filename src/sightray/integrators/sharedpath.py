@@ -71,7 +71,7 @@ class SharedPathTracer(PathTracer):
     """
 
     share: int = integer(
-        "pixels to a side of the squares that share paths; 1: none do", default=4, at_least=1, at_most=8
+        "pixels to a side of the squares that share paths; 1: none do", default=6, at_least=1, at_most=8
     )
 
     @property

@@ -154,8 +154,8 @@ def between_pixels(light: Table, along: f64, down: f64) -> Vec3:
     x, y = along - 0.5, down - 0.5
     left, top = math.floor(x), math.floor(y)
     s, t = x - left, y - top
-    column, row = int(left) % w, min(max(int(top), 0), h - 1)
-    following, below = (column + 1) % w, min(max(int(top) + 1, 0), h - 1)
+    column, row = w - 1 if left < 0.0 else int(left), min(max(int(top), 0), h - 1)
+    following, below = 0 if column + 1 == w else column + 1, min(max(int(top) + 1, 0), h - 1)
     pixels = table_at(light, PIXELS)
     upper = pixel_at(pixels, w, column, row) * (1.0 - s) + pixel_at(pixels, w, following, row) * s
     lower = pixel_at(pixels, w, column, below) * (1.0 - s) + pixel_at(pixels, w, following, below) * s

@@ -24,6 +24,7 @@ from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
+WIDE_TILE = 48  # for integrators that want pixels together, which their edges cut apart
 POLL = 0.1  # seconds between progress reports and looks at the keyboard
 
 
@@ -119,6 +120,7 @@ class _Job:
         rows = compiled.world, compiled.tables.row_of(integrator), compiled.tables.row_of(sampler)
         self.rows = (*rows, film.table, filter_table(filter, self.space))
         together = integrator.together
+        self.tile = TILE if together == 1 else WIDE_TILE
         self.options = (expected, int(expected == 1), seed, *((together,) if together > 1 else ()))
         self.threads = thread_count(threads)
         self.kernel = _jit.native(_root(integrator))
@@ -235,9 +237,9 @@ class _Job:
             self.rays += rays
 
     def _tiles(self) -> Iterator[tuple[int, int, int, int]]:
-        for y in range(0, self.film.height, TILE):
-            for x in range(0, self.film.width, TILE):
-                yield x, y, min(x + TILE, self.film.width), min(y + TILE, self.film.height)
+        for y in range(0, self.film.height, self.tile):
+            for x in range(0, self.film.width, self.tile):
+                yield x, y, min(x + self.tile, self.film.width), min(y + self.tile, self.film.height)
 
     def _tile(self, table: Table, tile: tuple[int, int, int, int]) -> tuple[int, int]:
         before = self.film.taken_in(*tile)

@@ -163,3 +163,39 @@ def test_furnace_full_of_fog():
     error = np.std(means, ddof=1) / math.sqrt(len(RUNS))
     assert abs(np.mean(means) - 1) < 4 * error
     assert error < 0.02
+
+
+AROUND = sr.HomogeneousMedium(scattering=(0.5, 0.3, 0.2), absorption=(0.02, 0.05, 0.1), g=0.3)
+CLEAR = sr.Boundary(interior=sr.HomogeneousMedium())
+EYE, SEEN = (0, 0, 2.5), {"vfov": 50, "width": 12, "height": 9}
+STILL = sr.PerspectiveCamera(eye=EYE, target=(0, 0, 0), **SEEN)
+LENS = sr.ThinLensCamera(eye=EYE, target=(0, 0, 0), lens_radius=0.1, focus_distance=2, **SEEN)
+BODIES = {
+    "fog": (sr.Sphere(radius=1e3, material=sr.Boundary(interior=AROUND)), (), STILL),
+    "glass that bends nothing": (sr.Sphere(radius=1e3, material=sr.Glass(ior=1.0, interior=AROUND)), (), STILL),
+    "a mesh of few triangles": (
+        sr.Mesh(
+            vertices=[(x, y, z) for x in (-900, 900) for y in (-900, 900) for z in (-900, 900)],
+            faces=[(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6),
+                   (0, 6, 4), (1, 7, 3), (1, 5, 7)],
+            material=sr.Boundary(interior=AROUND)),
+        (), STILL),
+    "a clear ball within fog": (
+        sr.Sphere(radius=1e3, material=sr.Boundary(interior=AROUND)),
+        (sr.Sphere(center=EYE, radius=0.2, material=CLEAR),), STILL),
+    "a lens half in a clear ball": (
+        sr.Sphere(radius=1e3, material=sr.Boundary(interior=AROUND)),
+        (sr.Sphere(center=(0.2, 0, 2.5), radius=0.2, material=CLEAR),), LENS),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_an_eye_within_a_body_sees_what_fills_it(name):
+    """As if the scene were filled: nearly the same numbers are drawn, and light scatters in front of other things, too."""
+    body, more, camera = BODIES[name]
+    things = [sr.Sphere(radius=0.6, material=sr.Lambert(albedo=0.6)), *more,
+              sr.SphereLight(center=(1.2, 1.0, 0.5), radius=0.2, radiance=40)]  # fmt: skip
+    scenes = sr.Scene(*things, body, camera=camera), sr.Scene(*things, medium=AROUND, camera=camera)
+    means = [np.mean([np.asarray(sr.render(scene, sr.PathTracer(max_depth=4), samples=64, seed=s)).mean(axis=(0, 1))
+                      for s in range(4)], axis=0) for scene in scenes]  # fmt: skip
+    np.testing.assert_allclose(means[0], means[1], rtol=0.03)

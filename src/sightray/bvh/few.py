@@ -96,9 +96,9 @@ def filter_blocks(corners: np.ndarray) -> np.ndarray:
     values[flat] = 0.0
     values[flat, -1] = np.inf
     blocks = aligned((-(-len(values) // 16), SIXTEEN_WORDS), np.float64)
-    lanes = np.full((len(blocks) * 16, values.shape[1]), np.nan)
-    lanes[: len(values)] = values
-    lanes = lanes.reshape(len(blocks), 16, -1).transpose(0, 2, 1)
+    padded = np.full((len(blocks) * 16, values.shape[1]), np.nan)
+    padded[: len(values)] = values
+    lanes = padded.reshape(len(blocks), 16, -1).transpose(0, 2, 1)
     blocks[:, : NORMAL // 2] = lanes[:, :4].reshape(len(blocks), -1)
     blocks.view(np.float32)[:, NORMAL:] = lanes[:, 4:].reshape(len(blocks), -1)
     return blocks

@@ -90,6 +90,13 @@ class Camera(Member, family="cameras"):
         """Whether it matters through which place of a lens a ray goes."""
         return False
 
+    def eye_of_all_rays(self) -> np.ndarray | None:
+        """The point, (3,) float64, where all rays of sight begin; None if they begin at several, or it is not known."""
+        one = self.chance() == 0 and self.readout == 0.0 and self.pixel_distance() == 0.0
+        if not one or type(self).world_from_camera is Camera.world_from_camera:
+            return None
+        return self.world_from_camera()[:3, 3]
+
     def chance(self) -> int:
         """What of a ray is left to chance, as bits: `LENS`, `MOMENT`. The engine draws no numbers for the rest."""
         return LENS * self.has_lens + MOMENT * (self.shutter_close > self.shutter_open)
@@ -199,6 +206,12 @@ def rolled(pose: np.ndarray, degrees: float) -> np.ndarray:
     return pose @ turn
 
 
+def _cross(a: Any, b: Any) -> np.ndarray:
+    """The cross product of two vectors, sooner than NumPy has found out that they are two."""
+    (ax, ay, az), (bx, by, bz) = map(float, a), map(float, b)
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
 def look_at(eye: Any, target: Any, up: Any, who: str) -> np.ndarray:
     """Camera pose, (4, 4): +z from `eye` to `target`, -y as near to `up` as can be.
 
@@ -211,10 +224,10 @@ def look_at(eye: Any, target: Any, up: Any, who: str) -> np.ndarray:
     if not forward.any():
         raise SceneError(f"{who}: eye and target are the same point {tuple(eye)}; allowed: two different points")
     forward /= np.linalg.norm(forward)
-    right = np.cross(forward, up)
+    right = _cross(forward, up)
     if np.linalg.norm(right) <= 1e-12 * np.linalg.norm(up):
         raise SceneError(f"{who}: up {tuple(up)} is parallel to the line of sight; allowed: any other direction")
     right /= np.linalg.norm(right)
     pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(forward, right), forward, eye
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, _cross(forward, right), forward, eye
     return pose

@@ -10,7 +10,7 @@ from sightray.cameras.base import Ray
 from sightray.fields import choice, flag, integer
 from sightray.integrators.base import Integrator, Radiance, radiance
 from sightray.integrators.direct import FAR, lit_normal
-from sightray.integrators.nesting import crossing, outside
+from sightray.integrators.nesting import around_eye, crossing
 from sightray.integrators.searching import BRDF, Search, behind, chance, from_lights
 from sightray.integrators.shading import first_step, frame_of, into, on_true_side, out_of
 from sightray.integrators.terminator import lifted
@@ -57,7 +57,7 @@ def direct_lighting_radiance(integrator: Table, world: Table, ray: Ray, draws: D
     search = Search(i64_at(integrator, STRATEGY), BRDF, i64_at(integrator, LIGHT_SAMPLES), every)
     o, d = ray.origin, ray.direction
     color, beta = grey(0.0), grey(1.0)  # beta: path throughput
-    nest, beam = outside(world), sight_beam(world, draws, no_table())
+    nest, beam = around_eye(world, o, d), sight_beam(world, draws, no_table())
     # Where the direction d was chosen, the normal there, and with which density; 0 for rays of sight and mirrors.
     start, n, density, gone = o, grey(0.0), 0.0, 0.0
     t_min = 0.0

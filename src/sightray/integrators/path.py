@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from sightray._jit import implements, kernel
-from sightray.accelerators.item import CLEAR, THIN, ItemHit
+from sightray.accelerators.item import CLEAR, ItemHit
 from sightray.cameras.base import Ray
 from sightray.fields import derived_array, flag, integer
 from sightray.fields import number as real
@@ -19,11 +19,11 @@ from sightray.integrators.direct import (
     light_of_skies,
     lit_normal,
 )
-from sightray.integrators.nesting import Nest, crossing, outside
+from sightray.integrators.nesting import Nest, around_eye, crossing
 from sightray.integrators.shading import first_step, frame_of, into, on_true_side, out_of
 from sightray.integrators.spectral import choose_bands, seen_colour
 from sightray.integrators.terminator import lifted
-from sightray.materials.base import bsdf, emitted, glow_in, interior, sample_bsdf
+from sightray.materials.base import bsdf, emitted, glow_in, sample_bsdf
 from sightray.mathlib.bands import BANDS_WORDS, ones
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, no_table, scratch, table_at
@@ -118,7 +118,8 @@ def from_eye(world: Table, ray: Ray, draws: Draws, bands: Table) -> Step:
     """The beginning of a walk."""
     beam = sight_beam(world, draws, bands)
     zero = grey(0.0)
-    return Step(ray.origin, ray.direction, ones(bands), outside(world), beam, ray.origin, zero, 0.0, 0.0, 0.0, 0, 0, 0)
+    nest = around_eye(world, ray.origin, ray.direction)
+    return Step(ray.origin, ray.direction, ones(bands), nest, beam, ray.origin, zero, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
 @kernel
@@ -162,9 +163,6 @@ def walk(integrator: Table, world: Table, first: Step, draws: Draws, pause: i64)
             color += limited(integrator, beta * behind, turns)
             break
         point = on_seen_side(point_of(world, hit, o, d, beam), d)
-        if nest.depth == 0 and point.cos_view < 0.0 and is_null(nest.here) and is_filled(point):
-            nest = crossing(world, nest, point, -d)  # the eye is inside of a body: look again, through what fills it
-            continue
         if event <= pause and point.flags & CLEAR == 0 and is_null(nest.here) and is_matte(point):
             here = Step(o, d, beta, nest, beam, start, n, density, gone, t_min, depth, turns, event - 1)
             return Walked(color, rays - 1, event - 1, hit, here)
@@ -206,12 +204,6 @@ def walk(integrator: Table, world: Table, first: Step, draws: Draws, pause: i64)
         depth += 1
         turns += 1
     return Walked(color, rays, event, ItemHit(math.inf, -1, 0, 0.0, 0.0), first)
-
-
-@kernel
-def is_filled(point: Point) -> bool:
-    """Whether a medium is behind a surface."""
-    return point.flags & THIN == 0 and not is_null(interior(point.material))
 
 
 @kernel

@@ -12,7 +12,7 @@ from sightray.fields import derived_number, integer
 from sightray.fields import number as real
 from sightray.integrators.base import Integrator, Radiance, radiance
 from sightray.integrators.direct import FAR, unblocked
-from sightray.integrators.nesting import Nest, crossing, outside
+from sightray.integrators.nesting import Nest, around_eye, crossing
 from sightray.integrators.shading import Frame, first_step, frame_of, into, on_true_side, out_of
 from sightray.integrators.terminator import lifted, shadow_ray
 from sightray.lights.base import WHOLE, illuminate
@@ -58,7 +58,7 @@ def phasor_radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> 
     wave = f64_at(integrator, WAVE)
     o, d = ray.origin, ray.direction
     found, beta = grey(0.0), grey(1.0)  # beta: path throughput
-    nest, beam = outside(world), sight_beam(world, draws, no_table())
+    nest, beam = around_eye(world, o, d), sight_beam(world, draws, no_table())
     gone, index = 0.0, 1.0  # optical length of the way so far; refractive index around
     mirrored = True  # whether lamps cannot have been found by looking for them
     t_min = 0.0

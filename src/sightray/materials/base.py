@@ -125,6 +125,11 @@ class Material(Member, family="materials"):
         return any(_differs(value) for value in self.values().values())
 
     @property
+    def filled(self) -> bool:
+        """Whether a medium is inside."""
+        return False
+
+    @property
     def thin(self) -> bool:
         """Whether it is a sheet with the same medium on both sides, such as a pane or a leaf."""
         return False

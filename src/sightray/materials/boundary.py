@@ -31,6 +31,10 @@ class Boundary(Material):
     _stain: Any = derived_vector("its absorption as Whitted's model sees it", _stain)
 
     @property
+    def filled(self) -> bool:
+        return True
+
+    @property
     def clear(self) -> bool:
         return True
 

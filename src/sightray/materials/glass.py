@@ -48,6 +48,10 @@ class Glass(Material):
     _inside: Any = derived_child("the medium inside, if there is one", medium_inside)
     _stain: Any = derived_vector("its absorption as Whitted's model sees it", stain)
 
+    @property
+    def filled(self) -> bool:
+        return medium_inside(self) is not None
+
     def check(self) -> None:
         """Refuse absorption beside a medium."""
         check_body(self)

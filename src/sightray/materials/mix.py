@@ -63,6 +63,10 @@ class Mix(Material):
         return self.a.translucent or self.b.translucent
 
     @property
+    def filled(self) -> bool:
+        return self.a.filled or self.b.filled
+
+    @property
     def thin(self) -> bool:
         return self.a.thin or self.b.thin
 

@@ -128,6 +128,10 @@ class Principled(Material):
         return _there(self.transmission)
 
     @property
+    def filled(self) -> bool:
+        return self.inside() is not None
+
+    @property
     def thin(self) -> bool:
         return self.thin_walled
 

@@ -55,6 +55,10 @@ class RoughGlass(Material):
     def translucent(self) -> bool:
         return True
 
+    @property
+    def filled(self) -> bool:
+        return medium_inside(self) is not None
+
     def check(self) -> None:
         """Refuse absorption beside a medium."""
         check_body(self)

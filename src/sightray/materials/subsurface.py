@@ -90,6 +90,10 @@ class Subsurface(Material):
                              "absorption")  # fmt: skip
 
     @property
+    def filled(self) -> bool:
+        return True
+
+    @property
     def translucent(self) -> bool:
         return True
 

@@ -53,6 +53,10 @@ class _Wrapper(Material):
         return self.material.translucent
 
     @property
+    def filled(self) -> bool:
+        return self.material.filled
+
+    @property
     def thin(self) -> bool:
         return self.material.thin
 

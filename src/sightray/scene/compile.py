@@ -144,10 +144,20 @@ class Compiled:
         link(world, world_row.MEDIUM, None if scene.medium is None else tables.row_of(scene.medium))
         if scene.camera is not None:
             link(world, world_row.CAMERA, tables.row_of(scene.camera))
+        world.view(np.int64)[world_row.AMID] = self._amid_bodies()
         numbers = world.view(np.float64)
         numbers[world_row.BACKGROUND : world_row.BACKGROUND + 3] = scene.background
         numbers[world_row.AMBIENT : world_row.AMBIENT + 3] = scene.ambient
         return world
+
+    def _amid_bodies(self) -> bool:
+        """Whether rays of sight may begin in a body that is filled."""
+        filled = [item for item in self.items if is_filled(item.material)]
+        if self.scene.camera is None or not filled:
+            return False
+        eye = self.scene.camera.eye_of_all_rays()
+        boxes = [world_bounds(item) for item in filled]
+        return eye is None or any(bool(((lower <= eye) & (eye <= upper)).all()) for lower, upper in boxes)
 
     def _pack_items(self, items: Table) -> tuple[np.ndarray, np.ndarray]:
         """Fill the items' rows; their bounds, each (n, 3). Items that were merged have none, what they became has."""
@@ -233,6 +243,11 @@ def flags_of(material: Any) -> int:
     # In the order of the bits CUTOUT, BUMPY, ...
     kinds = ("cutout", "bumpy", "oriented", "clear", "thin", "translucent", "patterned")
     return sum(1 << bit for bit, kind in enumerate(kinds) if getattr(material, kind))
+
+
+def is_filled(material: Any) -> bool:
+    """Whether there is a medium behind a surface of this material."""
+    return material.filled and not material.thin
 
 
 def light_indices(scene: Scene) -> list[int]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sightray as sr
+from sightray.engine.run import _Job
 
 SEEDS = 12
 
@@ -157,12 +158,12 @@ def test_each_pixel_has_its_samples_where_they_are_uneven():
 
 
 def test_a_render_goes_on_where_it_stopped(tmp_path):
-    scene, options = cornell(), {"samples": 12, "adaptive": "error"}
+    scene, options = cornell(), {"samples": 28, "adaptive": "error"}
     whole = sr.render(scene, sr.SharedPathTracer(), **options)
     pieces = 0
     while True:
 
-        def press(progress, after=2500 * (pieces + 1)):
+        def press(progress, after=6000 * (pieces + 1)):
             if progress.stage == "render" and progress.done >= after:
                 raise KeyboardInterrupt
 
@@ -174,3 +175,23 @@ def test_a_render_goes_on_where_it_stopped(tmp_path):
             pieces += 1
     assert pieces >= 2
     np.testing.assert_array_equal(whole, again)
+
+
+def test_tiles_lie_elsewhere_from_time_to_time(monkeypatch):
+    """Nothing is shared across their edges, which would show if they stayed; each time they cover the picture once."""
+    whole, seen = _Job._tiles, []
+
+    def noted(job, left, up):
+        tiles = list(whole(job, left, up))
+        seen.append((left, up))
+        covered = np.zeros((job.film.height, job.film.width), int)
+        for x0, y0, x1, y1 in tiles:
+            covered[y0:y1, x0:x1] += 1
+        assert (covered == 1).all()
+        return iter(tiles)
+
+    monkeypatch.setattr(_Job, "_tiles", noted)
+    scene = cornell()
+    picture = sr.render(scene, sr.SharedPathTracer(max_depth=2), samples=64)
+    assert (picture.info["sample_count"] == 64).all()
+    assert len(set(seen)) == len(seen) >= 8

@@ -24,7 +24,9 @@ from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
-WIDE_TILE = 48  # for integrators that want pixels together, which their edges cut apart
+# Where integrators want pixels together, edges of tiles cut them apart. So tiles are wide, and lie elsewhere every time that
+# pixels have taken so many samples: no edge stays where it could be seen.
+WIDE_TILE, AT_ONCE = 48, 8
 POLL = 0.1  # seconds between progress reports and looks at the keyboard
 
 
@@ -119,9 +121,8 @@ class _Job:
         self.stop = self.space.array(aligned(8, np.int64))
         rows = compiled.world, compiled.tables.row_of(integrator), compiled.tables.row_of(sampler)
         self.rows = (*rows, film.table, filter_table(filter, self.space))
-        together = integrator.together
-        self.tile = TILE if together == 1 else WIDE_TILE
-        self.options = (expected, int(expected == 1), seed, *((together,) if together > 1 else ()))
+        self.together = integrator.together > 1
+        self.options = (expected, int(expected == 1), seed, *((integrator.together,) if self.together else ()))
         self.threads = thread_count(threads)
         self.kernel = _jit.native(_root(integrator))
         self.target: np.ndarray | None = None
@@ -170,10 +171,24 @@ class _Job:
 
     def sweep(self, target: np.ndarray, until: float) -> bool:
         """Take samples until all pixels have as many as `target` says; False if the time `until` came first."""
+        if not self.together:
+            return self._cover(target, until, (0, 0))
+        left = 1
+        while left > 0:
+            # What is next follows from what there is, so that a render can be taken up anywhere.
+            most = int((target - self.film.taken()).max(initial=0))
+            left = max(0, most - 1) // AT_ONCE * AT_ONCE
+            offset = np.random.default_rng((int(target.max()), left)).integers(0, WIDE_TILE, 2)
+            if not self._cover(target - left, until, (int(offset[0]), int(offset[1]))):
+                return False
+        return True
+
+    def _cover(self, target: np.ndarray, until: float, offset: tuple[int, int]) -> bool:
+        """`sweep` with tiles that lie by `offset` pixels to the upper left."""
         table = Table(np.ascontiguousarray(target, np.int32))
         while True:
             self.stop.view(np.int64)[0] = 0
-            queue = self._tiles()
+            queue = self._tiles(*offset)
             running: set[Future] = set()
             with ThreadPoolExecutor(self.threads) as pool:
                 try:
@@ -236,10 +251,11 @@ class _Job:
             self.done += taken
             self.rays += rays
 
-    def _tiles(self) -> Iterator[tuple[int, int, int, int]]:
-        for y in range(0, self.film.height, self.tile):
-            for x in range(0, self.film.width, self.tile):
-                yield x, y, min(x + self.tile, self.film.width), min(y + self.tile, self.film.height)
+    def _tiles(self, left: int, up: int) -> Iterator[tuple[int, int, int, int]]:
+        side = WIDE_TILE if self.together else TILE
+        for y in range(-up, self.film.height, side):
+            for x in range(-left, self.film.width, side):
+                yield max(x, 0), max(y, 0), min(x + side, self.film.width), min(y + side, self.film.height)
 
     def _tile(self, table: Table, tile: tuple[int, int, int, int]) -> tuple[int, int]:
         before = self.film.taken_in(*tile)

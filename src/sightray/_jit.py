@@ -21,7 +21,8 @@ package, of the kernel's own code where it stands outside, the versions of Numba
 processor. Files are written aside and renamed, and carry a checksum, so that processes can race and files can rot
 without harm. A warm start loads the object code with llvmlite alone: Numba is not even imported.
 
-Set ``SIGHTRAY_JIT=0`` to run everything as plain Python, ``SIGHTRAY_CACHE_DIR`` to move the cache ("" for none).
+Set ``SIGHTRAY_JIT=0`` to run everything as plain Python, ``SIGHTRAY_CACHE_DIR`` to move the cache ("" for none). For
+``SIGHTRAY_COMPILERS`` see `sightray._compilers`.
 """
 
 from __future__ import annotations
@@ -428,6 +429,9 @@ def _find_symbol(name: str) -> bool:
     return True
 
 
+_at_hand: set[tuple[Callable, str]] = set()  # kernels whose file was seen in the cache, and their flavour
+
+
 @_cache
 def address(function: Callable) -> int:
     """Address of the machine code of a kernel; compiled only if the cache does not have it."""
@@ -444,10 +448,20 @@ def address(function: Callable) -> int:
         return found
 
 
+def compile_into_cache(function: Callable) -> None:
+    """Write the machine code of a kernel into the cache without loading it."""
+    _write(_cache_path(function), _compile(function))
+
+
 def is_compiled(function: Callable) -> bool:
     """Whether machine code for a kernel is at hand, in this process or in the cache."""
-    path = _cache_path(function)
-    return path is not None and path.exists()
+    asked = function, flavour.get()
+    if asked not in _at_hand:  # to find the file takes longer than a small picture
+        path = _cache_path(function)
+        if path is None or not path.exists():
+            return False
+        _at_hand.add(asked)
+    return True
 
 
 @_cache

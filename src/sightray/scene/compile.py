@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sightray import _jit
+from sightray._compilers import compile_missing
 from sightray._jit import METHOD_SLOTS
 from sightray.accelerators import item as item_row
 from sightray.errors import SceneError
@@ -97,13 +98,7 @@ class Tables:
         needed = _jit.needed_kernels(root, dict.fromkeys(type(member) for member, _ in rows))
         kernels = list(dict.fromkeys(itertools.chain([root], *(slots.values() for slots in needed.values()))))
         if compiled:
-            missing = [k for k in kernels if not _jit.is_compiled(k)]
-            for index, function in enumerate(missing):
-                if report is not None:
-                    report(index, len(missing), function.__name__)
-                _jit.address(function)
-            if report is not None and missing:
-                report(len(missing), len(missing), "")
+            compile_missing(kernels, report)
         addresses = {k: _jit.address(k) if compiled else 0 for k in kernels}
         for member, row in rows:
             set_methods(row, [(slot, k, addresses[k]) for slot, k in needed[type(member)].items()])

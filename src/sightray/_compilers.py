@@ -21,6 +21,7 @@ from sightray import _jit
 
 FEWEST = 8  # missing kernels for which helpers are worth their own start, about a second
 MOST = 4  # processes
+PATIENCE = 120.0  # seconds that a helper may take for its last kernel
 
 
 def compile_missing(kernels: list[Callable], report: Callable[[int, int, str], None] | None = None) -> None:
@@ -54,7 +55,9 @@ def _next(queue: deque[Callable], helpers: list[_Helper]) -> Callable | None:
         except IndexError:
             if not busy:
                 return None
-        busy[0].join()
+        busy[0].join(PATIENCE)
+        if busy[0].is_alive():
+            busy[0].process.kill()
 
 
 def _size(kernel: Callable) -> int:
@@ -64,7 +67,8 @@ def _size(kernel: Callable) -> int:
 
 def _helpers_for(missing: list[Callable]) -> int:
     """How many helpers to start."""
-    if len(missing) < FEWEST or _jit.cache_folder() is None or not sys.executable:
+    nobody = not sys.executable or getattr(sys, "frozen", False)  # no Python to be started
+    if nobody or len(missing) < FEWEST or _jit.cache_folder() is None:
         return 0
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:

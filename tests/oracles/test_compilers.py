@@ -77,3 +77,15 @@ def test_nothing_is_started_for_a_few(bench, monkeypatch):
     _compilers.compile_missing(LIBRARY)
     assert sorted(done, key=_compilers._size, reverse=True) == done
     assert set(done) == set(LIBRARY)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_a_helper_that_hangs_is_ended(bench, monkeypatch, tmp_path):
+    done, _ = bench
+    idle = tmp_path / "idle"
+    idle.write_text("#!/bin/sh\nexec sleep 60\n")
+    idle.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(idle))
+    monkeypatch.setattr(_compilers, "PATIENCE", 0.2)
+    _compilers.compile_missing([*LIBRARY, found_nowhere_else])
+    assert set(done) >= {*LIBRARY, found_nowhere_else}

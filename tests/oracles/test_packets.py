@@ -13,6 +13,7 @@ from sightray.bvh.casting import END, PACKET_WORDS, PRIM, cast_packet, share
 from sightray.bvh.hulls import are_close, extremes
 from sightray.bvh.packets import ROOM_WORDS, SPREAD, any_rays, closest_rays
 from sightray.bvh.triangles import MESH_WORDS, any_triangle, build_mesh, closest_triangle, pack_mesh
+from sightray.mathlib.lanes import load8, movemask8, push_all8, sort8, splat8
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, i64_at, scratch
 from sightray.mathlib.vec import Vec3
@@ -200,3 +201,28 @@ def test_python_and_machine_code_agree():
     assert slow_coherent == fast_coherent > 0.5
     np.testing.assert_array_equal(slow[..., 1:], fast[..., 1:])
     np.testing.assert_allclose(slow[..., 0], fast[..., 0], rtol=1e-11)
+
+
+@kernel
+def sort_and_push(lengths: Table, codes: Table, stack: Table) -> i64:
+    chosen = splat8(0.0) < load8(lengths, 8)
+    push_all8(stack, 0, sort8(load8(lengths, 0), load8(codes, 0), chosen))
+    return movemask8(chosen)
+
+
+def test_children_are_sorted_by_distance():
+    rng = np.random.default_rng(6)
+    run, stack = native(sort_and_push), np.zeros(8, np.int64)
+    for turn in range(200):
+        chosen, lengths = rng.random(8) < 0.5, rng.choice([0.0, 1e-30, 0.5, 0.50000003, 2.0], 8).astype(np.float32)
+        codes = rng.permutation(8).astype(np.int32) + (turn % 2 << 30)
+        table = Table(np.concatenate([lengths, np.where(chosen, 1, -1).astype(np.float32)]))
+        for call in (run, sort_and_push):
+            assert call(table, Table(codes), Table(stack)) == np.packbits(chosen, bitorder="little")[0]
+            found = stack[: chosen.sum()]
+            near, code = (found >> 32).astype(np.int32).view(np.float32), (found & 0xFFFFFFFF).astype(np.int32)
+            assert sorted(code) == sorted(codes[chosen])
+            assert (np.diff(near) <= 0).all()
+            true = lengths[np.argsort(codes)][code - codes.min()]
+            assert (near <= true).all()  # cut, never rounded up: no child is left out that is near enough
+            np.testing.assert_allclose(near, true, rtol=1e-6)

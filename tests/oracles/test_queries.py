@@ -140,8 +140,10 @@ def layouts(a):
     twice[::2] = a
     packed = np.zeros(len(a), np.dtype([("flag", "i1"), ("p", a.dtype, 3)]))  # unaligned
     packed["p"] = a
+    rows = np.zeros((6, 2 * len(a)), a.dtype)
+    rows[::2, ::2] = a.T
     return [a, np.asfortranarray(a), padded[:, 2:5], twice[::2], a[::-1].copy()[::-1], a[:, ::-1].copy()[:, ::-1],
-            packed["p"], a.astype(a.dtype.newbyteorder()), a.tolist()]  # fmt: skip
+            packed["p"], a.astype(a.dtype.newbyteorder()), a.tolist(), rows[::2, ::2].T]  # fmt: skip
 
 
 def test_every_layout_and_type_gives_the_same(ball):
@@ -155,6 +157,13 @@ def test_every_layout_and_type_gives_the_same(ball):
             np.testing.assert_array_equal(hits.t, expected.t)
             np.testing.assert_array_equal(hits.primitive, expected.primitive)
     np.testing.assert_array_equal(ball.intersect(o.astype(np.uint8), d).t, ball.intersect(o % 256, d).t)
+    for dtype in (np.float32, np.float64):  # planes of x, y, z, as pictures are often kept, whole and in part
+        planes = [np.moveaxis(np.ascontiguousarray(x.T.astype(dtype)).reshape(3, 50, 60), 0, -1) for x in (o, d)]
+        for part in (np.s_[:, :], np.s_[:, 7:50], np.s_[::3, 5:6]):
+            hits = ball.intersect(*(plane[part] for plane in planes))
+            np.testing.assert_array_equal(hits.t, expected.t.reshape(50, 60)[part])
+            blocked = ball.occluded(*(plane[part] for plane in planes))
+            np.testing.assert_array_equal(blocked, expected.hit.reshape(50, 60)[part])
     frozen = o.copy()
     frozen.flags.writeable = False
     np.testing.assert_array_equal(ball.intersect(frozen, d).t, expected.t)
@@ -226,6 +235,15 @@ def test_limits_are_strict(ball):
     assert ball.intersect(o, d, t_min=float(t)).t > t
     assert ball.intersect(o, 2 * d).t == t / 2
     assert ball.intersect(o, d, t_min=-INF).t == t
+
+
+def test_rays_may_begin_behind_their_origin(ball):
+    o, d = random_rays(np.random.default_rng(8), 3000, spread=0.5)  # within the mesh's box, most of them
+    ahead, moved = ball.intersect(o, d, t_min=-2), ball.intersect(o - 2 * d, d)
+    assert np.count_nonzero(ahead.t < 0) > 500
+    np.testing.assert_array_equal(ahead.primitive, moved.primitive)
+    np.testing.assert_allclose(ahead.t, moved.t - 2, atol=1e-12)
+    np.testing.assert_array_equal(ball.occluded(o, d, 0, t_min=-2), ahead.t < 0)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from sightray.accelerators.base import Accelerator, blocked, closest
 from sightray.accelerators.item import ItemHit, better, intersect_item, item_at, occluded_item, worth
 from sightray.bvh.binned_sah import build, pack_tree
 from sightray.bvh.bvh8 import (
+    BOTTOM,
     CHILD,
     LEAF,
     NODES,
@@ -23,8 +24,8 @@ from sightray.bvh.bvh8 import (
     box_ray,
     int_at,
     push_children,
-    push_children_unsorted,
     unit_ray,
+    visit_last,
 )
 from sightray.mathlib.hit import is_hit
 from sightray.mathlib.lanes import sort_key
@@ -127,18 +128,20 @@ def any_item(tree: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> bool:
     unit = unit_ray(tree, o, d, t_min, t_max)
     if not unit.reach >= 0.0:
         return False
-    boxes = box_ray(unit)
-    stack = scratch(STACK_WORDS)
-    i64_put(stack, 0, 0)
-    top = 1
+    boxes, nodes, stack = box_ray(unit), table_at(tree, NODES), scratch(STACK_WORDS)
+    i64_put(stack, 0, BOTTOM)
+    child, top = 0, 1
     while top > 0:
+        if child < LEAF:
+            next = visit_last(nodes, child, boxes, unit.reach, stack, top)
+            if next.met:
+                child, top = next.key, next.top
+                continue
+        else:
+            first, count = (child - LEAF) >> 3, child & 7
+            for i in range(first, first + count):
+                if occluded_item(item_at(items, int_at(table_at(tree, ORDER), i)), o, d, t_min, t_max):
+                    return True
         top -= 1
         child = i64_at(stack, top)
-        if child < LEAF:
-            top = push_children_unsorted(table_at(tree, NODES), child, boxes, unit.reach, stack, top)
-            continue
-        first, count = (child - LEAF) >> 3, child & 7
-        for i in range(first, first + count):
-            if occluded_item(item_at(items, int_at(table_at(tree, ORDER), i)), o, d, t_min, t_max):
-                return True
     return False

@@ -26,7 +26,7 @@ from sightray.bvh.bvh8 import (
     BoxRay,
     int_at,
     pop_near,
-    visit_last,
+    push_children_unsorted,
     visit_nearest,
 )
 from sightray.bvh.casting import (
@@ -49,6 +49,7 @@ from sightray.bvh.casting import (
     TO,
     WORK_WORDS,
     R,
+    cast_alone,
 )
 from sightray.bvh.triangles import (
     BLOCK_FLOATS,
@@ -62,15 +63,10 @@ from sightray.bvh.triangles import (
     shear,
 )
 from sightray.mathlib.lanes import (
-    load16,
     lowest_bit,
     prefetch,
-    put_ints16,
-    select16d,
     splat4,
     splat8,
-    splat16,
-    splat16d,
 )
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f32_at, f32_put, f64_at, f64_put, i64_at, i64_put, table_at
@@ -162,15 +158,11 @@ class Bundle(NamedTuple):
 
 
 @kernel
-def board(alive: i64, all_lanes: Table, room: Table) -> None:
-    """Prepare the rays `alive`: where nodes have their planes, empty stacks, and the root as what they visit next."""
+def board(alive: i64, works: Table, all_lanes: Table, room: Table) -> None:
+    """Prepare the rays `alive`: all that boxes need, empty stacks, and the root as what they visit next."""
     for p in range(4):
         if (alive >> (16 * p)) & 0xFFFF != 0:
-            lanes = advance(all_lanes, p * LANE_WORDS)
-            for axis in range(3):
-                lower, upper = splat16d(16.0 * axis), splat16d(16.0 * axis + 8.0)
-                up = load16(lanes, R + 16 * axis) > splat16(0.0)
-                put_ints16(lanes, PLANES + 16 * axis, select16d(up, lower, upper))
+            cast_alone(advance(works, p * WORK_WORDS), advance(all_lanes, p * LANE_WORDS))
     for k in range(64):
         i64_put(room, NEXT + k, 0)
         i64_put(room, TOPS + k, 1)
@@ -194,7 +186,7 @@ def closest_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
     """`closest_rays` for the rays `alive`, each on its own."""
-    board(alive, all_lanes, room)
+    board(alive, works, all_lanes, room)
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
     now, found, due = Bundle(alive, 0), 0, 0
     while now.nodes | now.leaves | due != 0:
@@ -209,8 +201,6 @@ def closest_in_turns(
             reach = float_at(lanes, END_AT + (k & 15))
             node = i64_at(room, NEXT + k) & CHILD
             next = visit_nearest(nodes, node, box_ray_of(lanes, k & 15), reach, stack, top)
-            if not next.met:
-                next = pop_near(stack, top, reach)
             now = proceed(mesh, room, now, k, next.key, next.top)
         while leaves != 0:
             k = lowest_bit(leaves)
@@ -264,7 +254,7 @@ def any_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
     """`any_rays` for the rays `alive`, each on its own."""
-    board(alive, all_lanes, room)
+    board(alive, works, all_lanes, room)
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
     now, blocked = Bundle(alive, 0), 0
     while now.nodes | now.leaves != 0:
@@ -276,10 +266,9 @@ def any_in_turns(
             stack, top = advance(room, STACKS + k * STRIDE), i64_at(room, TOPS + k)
             lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
             reach = float_at(lanes, END_AT + (k & 15))
-            below = i64_at(stack, top - 1)
-            next = visit_last(nodes, i64_at(room, NEXT + k) & CHILD, box_ray_of(lanes, k & 15), reach, stack, top)
-            key, top = (next.key, next.top) if next.met else (below, top - 1)
-            now = proceed(mesh, room, now, k, key, top)
+            node = i64_at(room, NEXT + k) & CHILD
+            top = push_children_unsorted(nodes, node, box_ray_of(lanes, k & 15), reach, stack, top) - 1
+            now = proceed(mesh, room, now, k, i64_at(stack, top), top)
         while leaves != 0:
             k = lowest_bit(leaves)
             leaves &= leaves - 1

@@ -32,12 +32,11 @@ from sightray.mathlib.lanes import (
     Mask8,
     count_bits,
     highest_bit,
-    last8,
     load8,
     lowest_bit,
     movemask8,
     push8,
-    push_before_last8,
+    push_all8,
     sort8,
     sort_key,
     splat8,
@@ -56,7 +55,7 @@ LEAF = 1 << 30  # the bit that tells leaves from nodes
 CHILD = (1 << 32) - 1  # the half of a sort key that names the child
 STACK_WORDS = 192  # that a ray's stack has; see `collapse`, which makes no tree that needs more
 
-BOTTOM = -(1 << 62)  # below all keys, and names the root, which is no child: the end of a stack
+BOTTOM = -(1 << 63)  # above no key, were it of a negative length; names the root, which is no child: the end of a stack
 
 # The head of a row that has a tree.
 NODES = METHOD_SLOTS  # pointer to the nodes
@@ -195,12 +194,10 @@ class Next(NamedTuple):
 
 @kernel
 def visit_nearest(nodes: Table, node: i64, ray: BoxRay, reach: f64, stack: Table, top: i64) -> Next:
-    """The nearest child that the ray meets within `reach`; keys of the others are pushed, nearer ones later."""
+    """Push keys of the children that the ray meets within `reach`, the nearest last, and pop what is next."""
     found = meet_boxes(nodes, node, ray, reach)
-    count = count_bits(movemask8(found.met))
-    keys = sort8(found.near, load8(nodes, node * NODE_FLOATS + CHILDREN), found.met)
-    push_before_last8(stack, top, keys, count)
-    return Next(last8(keys), top + max(count - 1, 0), count > 0)
+    push_all8(stack, top, sort8(found.near, load8(nodes, node * NODE_FLOATS + CHILDREN), found.met))
+    return pop_near(stack, top + count_bits(movemask8(found.met)), reach)
 
 
 @kernel

@@ -31,7 +31,7 @@ from sightray.bvh.bundles import (
 )
 from sightray.bvh.bvh8 import CHILD, LEAF, NODES, int_at, pop_near, visit_nearest
 from sightray.bvh.casting import ALONG, END, END_AT, LANE_WORDS, PACKET_WORDS, PRIM, SIDE, SPEED, START, WORK_WORDS
-from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, EDGES, NUMBERS, TriangleRay
+from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, EDGES, NUMBERS, SIDES, TriangleRay
 from sightray.mathlib.lanes import (
     F32x4,
     F32x16,
@@ -57,7 +57,7 @@ from sightray.mathlib.lanes import (
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f32_put, f64_at, f64_put, i64_at, scratch, table_at
 
-KEPT = 1 / 64  # of the slack of the barycentric coordinates
+KEPT = 4 / (16 * SIDES)  # of the slack of the barycentric coordinates
 
 
 @kernel
@@ -129,7 +129,7 @@ def fast_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
     """`closest_in_turns`, but what the filter finds is final, so that nothing waits for corners."""
-    board(alive, all_lanes, room)
+    board(alive, works, all_lanes, room)
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
     now, found = Bundle(alive, 0), 0
     while now.nodes | now.leaves != 0:
@@ -143,8 +143,6 @@ def fast_in_turns(
             reach = float_at(lanes, END_AT + (k & 15))
             node = i64_at(room, NEXT + k) & CHILD
             next = visit_nearest(nodes, node, box_ray_of(lanes, k & 15), reach, stack, top)
-            if not next.met:
-                next = pop_near(stack, top, reach)
             now = proceed(mesh, room, now, k, next.key, next.top)
         while leaves != 0:
             k = lowest_bit(leaves)

@@ -20,7 +20,7 @@ from sightray._jit import kernel
 from sightray.bvh.bundles import float_at
 from sightray.bvh.bvh8 import STACK_WORDS, Met
 from sightray.bvh.casting import END_AT, FROM, SIDE, R
-from sightray.bvh.triangles import EDGES
+from sightray.bvh.triangles import EDGES, SIDES
 from sightray.mathlib.lanes import (
     F32x4,
     F32x8,
@@ -69,7 +69,7 @@ class Interval(NamedTuple):
 def interval(lanes: Table, axis: i64) -> Interval:
     """The extremes of a packet along one axis."""
     met, inf, zero = load16(lanes, END_AT) >= splat16(0.0), splat16(math.inf), splat16(0.0)
-    o, slack = load16(lanes, FROM + 16 * axis), load16(lanes, SIDE) * splat16(1 / 16)
+    o, slack = load16(lanes, FROM + 16 * axis), load16(lanes, SIDE) * splat16(1 / SIDES)
     r = load16(lanes, R + 16 * axis)
     r = flip16(r, r)
     slowest, fastest = least16(select16(met, r, inf)), -least16(select16(met, zero - r, inf))

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sightray._jit import kernel
-from sightray.bvh.bundles import BUNDLE_WORDS, any_in_turns, closest_in_turns, prefetch_child
+from sightray.bvh.bundles import BUNDLE_WORDS, any_in_turns, closest_in_turns, float_at, prefetch_child
 from sightray.bvh.bvh8 import BOTTOM, CHILD, CHILDREN, LEAF, NODE_FLOATS, NODES, int_at, pop_near
 from sightray.bvh.casting import (
     END,
@@ -53,12 +53,11 @@ from sightray.bvh.hulls import (
     put_reach,
     put_slabs,
 )
-from sightray.bvh.sixteen import decide_triangle, filter_triangle, prepare_shear, reach_of
+from sightray.bvh.sixteen import decide_triangle, edge_sizes, filter_triangle, prepare_shear, reach_of
 from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, INDICES, NUMBERS
 from sightray.mathlib.lanes import (
     count_bits,
     highest_bit,
-    last8,
     load8,
     load16,
     load16d,
@@ -67,7 +66,7 @@ from sightray.mathlib.lanes import (
     movemask8,
     movemask16,
     push8,
-    push_before_last8,
+    push_all8,
     select16,
     select16d,
     sort8,
@@ -139,12 +138,9 @@ def closest_together(mesh: Table, packets: Table, t_min: f64, groups: i64, fast:
             at, top = (i64_at(group, KEY) & CHILD) * NODE_FLOATS, i64_at(group, TOP)
             met = meet_interval(nodes, at, group)
             count = count_bits(movemask8(met.met))
-            keys = sort8(met.near, load8(nodes, at + CHILDREN), met.met)
-            push_before_last8(advance(group, STACK), top, keys, count)
-            if count > 0:
-                now = go_on(mesh, group, now, g, last8(keys), top + count - 1)
-            else:
-                now = pop_and_go_on(mesh, group, now, g)
+            push_all8(advance(group, STACK), top, sort8(met.near, load8(nodes, at + CHILDREN), met.met))
+            i64_put(group, TOP, top + count)
+            now = pop_and_go_on(mesh, group, now, g)
         while leaves != 0:
             g = lowest_bit(leaves)
             leaves &= leaves - 1
@@ -169,13 +165,14 @@ def meet_block_closest(
 ) -> None:
     """Meet the triangles of a block with the rays of a group."""
     blocks, first = table_at(mesh, BLOCKS), i64_at(group, FIRST)
-    culled = cull_triangles(blocks, block * BLOCK_FLOATS, group)
+    culled, sizes = cull_triangles(blocks, block * BLOCK_FLOATS, group), scratch(2)
+    edge_sizes(blocks, block * BLOCK_FLOATS, sizes)
     while culled != 0:
         bit = lowest_bit(culled)
         culled &= culled - 1
         p, at = bit >> 2, block * BLOCK_FLOATS + (bit & 3)
         lanes = advance(room, LANES + (first + p) * LANE_WORDS)
-        met = filter_triangle(blocks, at, lanes)
+        met = filter_triangle(blocks, at, float_at(sizes, bit & 3), lanes)
         maybe = met.maybe & i64_at(group, ALIVE + p)
         if maybe != 0:
             packet, work = advance(packets, (first + p) * PACKET_WORDS), advance(room, WORKS + (first + p) * WORK_WORDS)
@@ -243,7 +240,8 @@ def any_together(mesh: Table, packets: Table, t_min: f64, groups: i64, room: Tab
 def meet_block_any(mesh: Table, packets: Table, t_min: f64, block: i64, group: Table, room: Table) -> None:
     """Find the rays of a group that the triangles of a block stop."""
     blocks, first = table_at(mesh, BLOCKS), i64_at(group, FIRST)
-    culled = cull_triangles(blocks, block * BLOCK_FLOATS, group)
+    culled, sizes = cull_triangles(blocks, block * BLOCK_FLOATS, group), scratch(2)
+    edge_sizes(blocks, block * BLOCK_FLOATS, sizes)
     while culled != 0:
         bit = lowest_bit(culled)
         culled &= culled - 1
@@ -252,7 +250,7 @@ def meet_block_any(mesh: Table, packets: Table, t_min: f64, block: i64, group: T
         if alive == 0:
             continue
         lanes = advance(room, LANES + (first + p) * LANE_WORDS)
-        met = filter_triangle(blocks, at, lanes)
+        met = filter_triangle(blocks, at, float_at(sizes, bit & 3), lanes)
         stopped, doubtful = met.surely & alive, met.maybe & alive & ~met.surely
         if doubtful != 0:
             packet, work = advance(packets, (first + p) * PACKET_WORDS), advance(room, WORKS + (first + p) * WORK_WORDS)

@@ -13,11 +13,13 @@ from sightray._jit import kernel
 from sightray.bvh.bundles import float_at
 from sightray.bvh.bvh8 import int_at
 from sightray.bvh.casting import ALONG, DIRECTION, END_AT, FROM, SHEAR, SIDE, SLACK, SPEED, START, TO
-from sightray.bvh.triangles import BLOCKS, VERTICES
+from sightray.bvh.triangles import BLOCKS, EDGES, VERTICES
 from sightray.mathlib.lanes import (
     F32x16,
     F64x16,
+    flip4,
     flip16,
+    load4,
     load16,
     load16d,
     movemask16,
@@ -26,12 +28,14 @@ from sightray.mathlib.lanes import (
     select16d,
     splat16,
     splat16d,
+    store4,
     store16d,
+    vmax4,
     vmax16d,
     vmin16,
     vmin16d,
 )
-from sightray.mathlib.scalars import i64
+from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, table_at
 
 
@@ -50,12 +54,20 @@ class FilteredLanes(NamedTuple):
 
 
 @kernel
-def filter_triangle(blocks: Table, at: i64, lanes: Table) -> FilteredLanes:
-    """`filter_block` for one triangle and sixteen rays."""
+def edge_sizes(blocks: Table, at: i64, sizes: Table) -> None:
+    """How large the four triangles of a block are: the larger 1-norm of their edges."""
+    bx, by, bz = load4(blocks, at + EDGES), load4(blocks, at + EDGES + 4), load4(blocks, at + EDGES + 8)
+    cx, cy, cz = load4(blocks, at + 2 * EDGES), load4(blocks, at + 2 * EDGES + 4), load4(blocks, at + 2 * EDGES + 8)
+    b, c = flip4(bx, bx) + flip4(by, by) + flip4(bz, bz), flip4(cx, cx) + flip4(cy, cy) + flip4(cz, cz)
+    store4(sizes, 0, vmax4(b, c))
+
+
+@kernel
+def filter_triangle(blocks: Table, at: i64, size: f64, lanes: Table) -> FilteredLanes:
+    """`filter_block` for one triangle of that size and sixteen rays."""
     ax, ay, az = lanes_at(blocks, at), lanes_at(blocks, at + 4), lanes_at(blocks, at + 8)
-    b1, b2, b3 = float_at(blocks, at + 12), float_at(blocks, at + 16), float_at(blocks, at + 20)
-    c1, c2, c3 = float_at(blocks, at + 24), float_at(blocks, at + 28), float_at(blocks, at + 32)
-    bx, by, bz, cx, cy, cz = splat16(b1), splat16(b2), splat16(b3), splat16(c1), splat16(c2), splat16(c3)
+    bx, by, bz = lanes_at(blocks, at + 12), lanes_at(blocks, at + 16), lanes_at(blocks, at + 20)
+    cx, cy, cz = lanes_at(blocks, at + 24), lanes_at(blocks, at + 28), lanes_at(blocks, at + 32)
     dx, dy, dz = load16(lanes, TO), load16(lanes, TO + 16), load16(lanes, TO + 32)
     px, py, pz = dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx  # d x c
     sx, sy, sz = load16(lanes, FROM) - ax, load16(lanes, FROM + 16) - ay, load16(lanes, FROM + 32) - az
@@ -64,12 +76,12 @@ def filter_triangle(blocks: Table, at: i64, lanes: Table) -> FilteredLanes:
     det = flip16(signed, signed)
     u = flip16(sx * px + sy * py + sz * pz, signed)
     v = flip16(dx * qx + dy * qy + dz * qz, signed)
-    size = splat16(max(abs(b1) + abs(b2) + abs(b3), abs(c1) + abs(c2) + abs(c3)))
-    side, zero = size * load16(lanes, SIDE), splat16(0.0)
+    edge, zero = splat16(size), splat16(0.0)
+    side = edge * load16(lanes, SIDE)
     inside = vmin16(vmin16(u, v), det - (u + v))
     if movemask16(inside + side >= zero) == 0:
         return FilteredLanes(0, 0, zero)
-    along = size * size * load16(lanes, ALONG)
+    along = edge * edge * load16(lanes, ALONG)
     t = flip16(cx * qx + cy * qy + cz * qz, signed)
     ahead = vmin16(t, det * load16(lanes, END_AT) - t)
     maybe = (inside + side >= zero) & (ahead + along >= zero)

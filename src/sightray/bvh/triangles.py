@@ -6,11 +6,11 @@ lanes; then, as 32-bit integers, which vertices of the mesh these are (36-47).
 
 **The filter** is Möller and Trumbore's test in the tree's unit frame, multiplied by the determinant instead of divided,
 with slack. Let u = 2^-24 and L the larger 1-norm of a triangle's two edges. Coordinates are at most 1 and differences at
-most 2, inputs are rounded by u, operations by u of their result. To first order this moves the two barycentric numerators
-by 38 u L and 34 u L, the determinant by 8 u L^2 and the numerator of the length by 17 u L^2. With L <= 6, comparing the
-sum of the weights with the determinant needs 128 u L of slack, comparing lengths 40 u L^2, and both cover determinants so
-small that their sign is in doubt. A ray's `slack` (see `bvh8`) is at least 16 u: 16 and 3 times that are used. What lies
-inside by as much is surely hit, which is all that shadow rays ask.
+most 2, inputs are rounded by u (directions by 2 u), operations by u of their result. To first order this moves the two
+barycentric numerators by 42 u L and 38 u L, the determinant by 10 u L^2 and the numerator of the length by 17 u L^2. With
+L <= 6, comparing the sum of the weights with the determinant needs 148 u L of slack, comparing lengths 43 u L^2, and both
+cover determinants so small that their sign is in doubt. A ray's `slack` (see `bvh8`) is at least 16 u: `SIDES` and `ALONGS`
+times that are used. What lies inside by as much is surely hit, which is all that shadow rays ask.
 
 **The decision** is the watertight test of Woop, Benthin and Wald on the mesh's own double-precision vertices. The ray's
 largest component becomes z; all vertices are sheared so that the ray runs along z through the origin; the signs of three
@@ -77,6 +77,7 @@ from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.vec import Vec3, rounded_cross, rounded_product
 
 BLOCK_FLOATS, EDGES, INDICES = 48, 12, 36
+SIDES, ALONGS = 10.0, 3.0  # slacks that the filter allows
 
 # A mesh row, after the head of its tree.
 BLOCKS = TREE_WORDS  # pointer to the blocks
@@ -201,7 +202,7 @@ def triangle_ray(ray: UnitRay) -> TriangleRay:
     """Prepare a ray for the blocks."""
     return TriangleRay(
         splat4(ray.o.x), splat4(ray.o.y), splat4(ray.o.z), splat4(ray.d.x), splat4(ray.d.y), splat4(ray.d.z),
-        splat4(16.0 * ray.slack), splat4(3.0 * ray.slack),
+        splat4(SIDES * ray.slack), splat4(ALONGS * ray.slack),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ Any other name is that of a file with meshes, or of a built-in scene, whose mesh
 
 **Coherent** rays are those of a camera of 1024 x 1024 pixels (thin: 512 x 512), in tiles of 8 x 8; **diffuse** rays leave
 the points that these hit, in directions spread by the cosine. All are single precision, because that is what other ray
-tracers take.
+tracers take, and rows of three, because that is how arrays (n, 3) lie as a rule.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def camera_rays(eye: Any, target: Any, half: float, pixels: int = PIXELS) -> Ray
     u, v = ((x + 0.5) / pixels * 2 - 1) * half, (1 - (y + 0.5) / pixels * 2) * half
     d = forward + u[:, None] * right + v[:, None] * np.cross(right, forward)
     d /= np.linalg.norm(d, axis=1, keepdims=True)
-    return np.broadcast_to(eye, d.shape).astype(np.float32), d.astype(np.float32)
+    return np.full(d.shape, eye, np.float32), d.astype(np.float32)
 
 
 def rays_around(lower: np.ndarray, upper: np.ndarray, pixels: int = PIXELS) -> Rays:

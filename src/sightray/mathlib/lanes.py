@@ -304,22 +304,19 @@ def push8(stack: Table, top: i64, codes: F32x8, bits: i64) -> None:
 
 @primitive
 def sort8(lengths: F32x8, codes: F32x8, chosen: Mask8) -> I64x8:
-    """The `sort_key` of each lane's length, with its code as low half; descending, and first those that are not chosen."""
-    keys = lengths.values.view(np.int32).astype(np.int64) << 32 | codes.values.view(np.uint32)
-    return I64x8(np.sort(np.where(chosen.bits, keys, np.iinfo(np.int64).max))[::-1])
+    """The `sort_key` of each lane's length, with its code as low half; descending, and last those that are not chosen.
+
+    Of each length the three lowest bits are cleared, so that it takes only 32 bits to sort.
+    """
+    bits = np.where(chosen.bits, lengths.values.view(np.int32) & ~7 | np.arange(8), -8 | np.arange(8))
+    order = np.argsort(-bits.astype(np.int64))
+    return I64x8((bits[order].astype(np.int64) & ~7) << 32 | codes.values.view(np.uint32)[order])
 
 
 @primitive
-def last8(keys: I64x8) -> i64:
-    """The last of eight integers."""
-    return int(keys.values[7])
-
-
-@primitive
-def push_before_last8(stack: Table, top: i64, keys: I64x8, count: i64) -> None:
-    """Of the last `count` keys write all but the last from word `top` on. Uses eight words."""
-    picked = keys.values[8 - count : 7]
-    stack.view(np.int64)[top : top + len(picked)] = picked
+def push_all8(stack: Table, top: i64, keys: I64x8) -> None:
+    """Write eight integers from word `top` on."""
+    stack.view(np.int64)[top : top + 8] = keys.values
 
 
 @primitive
@@ -358,6 +355,12 @@ def round16(a: F64x16) -> F32x16:
     """Sixteen doubles rounded to floats."""
     with np.errstate(all="ignore"):
         return F32x16(a.values.astype(np.float32))
+
+
+@primitive
+def widen16(a: F32x16) -> F64x16:
+    """Sixteen floats as doubles."""
+    return F64x16(a.values)
 
 
 @primitive
@@ -400,6 +403,13 @@ def vmax16d(a: F64x16, b: F64x16) -> F64x16:
 def abs16d(a: F64x16) -> F64x16:
     """Absolute value of each lane."""
     return F64x16(np.abs(a.values))
+
+
+@primitive
+def sqrt16d(a: F64x16) -> F64x16:
+    """Square roots; NaN of what is negative."""
+    with np.errstate(invalid="ignore"):
+        return F64x16(np.sqrt(a.values))
 
 
 @primitive

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from typing import Any
 
+import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global
@@ -17,6 +18,7 @@ from sightray.mathlib.vec_llvm import llvm_function
 
 F32, F64, I1, I32, I64 = ir.FloatType(), ir.DoubleType(), ir.IntType(1), ir.IntType(32), ir.IntType(64)
 FLAGS = ("contract", "nsz")
+HOST = llvm.get_host_cpu_features()
 
 
 class LanesType(types.Type):
@@ -153,7 +155,7 @@ def _lower_width(width: int, scalar: Any, suffix: str, names: str) -> None:
 _lower_width(4, F32, "", "splat load store movemask vmin vmax flip")
 _lower_width(8, F32, "", "splat load store movemask vmin vmax select sqrt")
 _lower_width(16, F32, "", "splat load store movemask vmin vmax flip least select")
-_lower_width(16, F64, "d", "splat load store vmin vmax abs select product")
+_lower_width(16, F64, "d", "splat load store vmin vmax abs select product sqrt")
 
 
 def _half(first: int) -> Any:
@@ -179,6 +181,11 @@ def mask16(builder: Any, bits: Any) -> Any:
 @lower(lanes.round16)
 def round16(builder: Any, a: Any) -> Any:
     return builder.fptrunc(a, ir.VectorType(F32, 16))
+
+
+@lower(lanes.widen16)
+def widen16(builder: Any, a: Any) -> Any:
+    return builder.fpext(a, ir.VectorType(F64, 16))
 
 
 @lower(lanes.extract4)
@@ -232,36 +239,46 @@ def push8(builder: Any, stack: Any, top: Any, codes: Any, bits: Any) -> None:
     builder.store(words, element(builder, stack, top, words.type, 8), align=8)
 
 
+def _permuted(builder: Any, values: Any, lanes_of: Any) -> Any:
+    """Eight lanes by numbers that only the running program knows."""
+    if HOST.get("avx2"):
+        return _call(builder, "llvm.x86.avx2.permd", values.type, values, lanes_of)
+    result = ir.Constant(values.type, ir.Undefined)
+    for lane in range(8):
+        value = builder.extract_element(values, builder.extract_element(lanes_of, I32(lane)))
+        result = builder.insert_element(result, value, I32(lane))
+    return result
+
+
 @lower(lanes.sort8)
 def sort8(builder: Any, lengths: Any, codes: Any, chosen: Any) -> Any:
     narrow, wide = ir.VectorType(I32, 8), ir.VectorType(I64, 8)
-    last = ir.Constant(narrow, [(1 << 31) - 1] * 8)
-    lengths = builder.select(chosen, builder.bitcast(lengths, narrow), last)
-    zipped = [lane // 2 + 8 * (lane % 2) for lane in range(16)]
-    keys = builder.bitcast(_shuffle(builder, builder.bitcast(codes, narrow), lengths, zipped), wide)
+    seven = ir.Constant(narrow, [7] * 8)
+    lengths = builder.or_(builder.bitcast(lengths, narrow), seven)
+    keys = builder.select(chosen, lengths, ir.Constant(narrow, [-1] * 8))
+    keys = builder.xor(keys, ir.Constant(narrow, [7 - lane for lane in range(8)]))
 
     # A sorting network has no branches (K. Batcher, "Sorting networks and their applications", 1968).
     for block in (2, 4, 8):
         step = block // 2
         while step > 0:
             other = _shuffle(builder, keys, keys, [lane ^ step for lane in range(8)])
-            low = _call(builder, "llvm.smin.v8i64", wide, keys, other)
-            high = _call(builder, "llvm.smax.v8i64", wide, keys, other)
+            low = _call(builder, "llvm.smin.v8i32", narrow, keys, other)
+            high = _call(builder, "llvm.smax.v8i32", narrow, keys, other)
             keys_of = [lane if (lane & step == 0) == (lane & block == 0) else 8 + lane for lane in range(8)]
             keys = _shuffle(builder, high, low, keys_of)
             step //= 2
-    return keys
+
+    # The three lowest bits say from which lane a length came.
+    lanes_of = builder.and_(keys, seven)
+    sorted_codes = _permuted(builder, builder.bitcast(codes, narrow), lanes_of)
+    keys = builder.xor(keys, lanes_of)
+    zipped = [lane // 2 + 8 * (lane % 2) for lane in range(16)]
+    return builder.bitcast(_shuffle(builder, sorted_codes, keys, zipped), wide)
 
 
-@lower(lanes.last8)
-def last8(builder: Any, keys: Any) -> Any:
-    return builder.extract_element(keys, I32(7))
-
-
-@lower(lanes.push_before_last8)
-def push_before_last8(builder: Any, stack: Any, top: Any, keys: Any, count: Any) -> None:
-    bits = builder.and_(builder.shl(I64(0xFF), builder.sub(I64(8), count)), I64(0x7F))
-    keys = _compressed(builder, keys, bits, "v8i64")
+@lower(lanes.push_all8)
+def push_all8(builder: Any, stack: Any, top: Any, keys: Any) -> None:
     builder.store(keys, element(builder, stack, top, keys.type, 8), align=8)
 
 

@@ -7,6 +7,7 @@ accessor of its type; accessors of narrower types count in elements of their own
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -78,7 +79,7 @@ class Space:
 def aligned(shape: int | tuple[int, ...], dtype: Any, boundary: int = 64) -> np.ndarray:
     """Zeros that start on a cache line, so that vector loads never straddle two."""
     dtype = np.dtype(dtype)
-    count = int(np.prod(shape))
+    count = math.prod(shape) if isinstance(shape, tuple) else int(shape)
     raw = np.zeros(count * dtype.itemsize + boundary, np.uint8)
     start = -raw.ctypes.data % boundary
     return raw[start : start + count * dtype.itemsize].view(dtype).reshape(shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -12,6 +13,7 @@ from sightray.errors import SceneError
 from sightray.mathlib.table import Table
 
 _DIRECT = {np.dtype(np.float64): 0, np.dtype(np.float32): 1}  # what kernels read; the value is the form's lowest bit
+_FAR = 1 << 30  # more numbers than this are not stepped over
 _PYTHON = not enabled()  # kernels then read NumPy arrays, not addresses
 
 
@@ -73,22 +75,23 @@ class Output:
 class Column:
     """One input of a batch: `width` numbers for each ray.
 
-    Kernels read it where it lies if it is single or double precision, the numbers of a ray are neighbours, and rays
-    follow one another at a constant step. All else is converted to double precision, chunk by chunk.
+    Kernels read it where it lies if it is single or double precision, and both rays and the numbers of a ray follow one
+    another at constant steps: as rows of three, as three rows, with other columns between. All else is converted to
+    double precision, chunk by chunk. Its `form` says how it lies: see `query_kernels`.
     """
 
     __slots__ = ("address", "array", "form", "shape", "size", "step", "width")
 
     def __init__(self, array: np.ndarray, shape: tuple[int, ...], width: int):
         self.width, self.shape = width, shape
-        single, step = _DIRECT.get(array.dtype, -1), -1
+        single, step, apart = _DIRECT.get(array.dtype, -1), -1, 1
         if array.size == width:  # one for all rays
             array, step = (array if single >= 0 and array.flags.c_contiguous else _doubles(array)), 0
             single = max(single, 0) if array.dtype == np.float32 else 0
-        elif single >= 0 and array.flags.aligned and array.size == width * math.prod(shape):
-            step = _step(array, width)
+        elif single >= 0 and array.flags.aligned and 0 < array.size == width * math.prod(shape):
+            step, apart = _steps(array, width)
         self.array, self.step, self.size = array, step, array.itemsize
-        self.form = 2 * step + single if step >= 0 else 2 * width
+        self.form = apart << 32 | step << 1 | single if step >= 0 else 1 << 32 | width << 1
         self.address = array.ctypes.data if step >= 0 else 0
 
     def chunk(self, first: int, last: int) -> Pointer | Table:
@@ -99,10 +102,12 @@ class Column:
         if self.step == 0:
             return Table(self.array.reshape(-1))
         full = np.broadcast_to(self.array, self.shape + ((width,) if width > 1 else ()))
-        if self.step > 0:
-            lines = np.zeros((last - first, self.step), self.array.dtype)
-            lines[:, :width] = full.reshape(-1, width)[first:last]
-            return Table(lines)
+        if self.step > 0:  # plain Python follows no pointers: the same steps in memory of its own
+            apart = self.form >> 32
+            places = np.arange(last - first)[:, None] * self.step + np.arange(width) * apart
+            numbers = np.zeros(places.max() + 1, self.array.dtype)
+            numbers[places] = full.reshape(-1, width)[first:last]
+            return Table(numbers)
         if len(self.shape) == 1:
             return Table(np.array(full[first:last], np.float64, order="C"))
         return Table(np.array(full.flat[width * first : width * last], np.float64))
@@ -112,10 +117,13 @@ def _doubles(array: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array, np.float64).reshape(array.shape)
 
 
-def _step(array: np.ndarray, width: int) -> int:
-    """Step from ray to ray in numbers if kernels can read the array, or else -1."""
-    if array.flags.c_contiguous:
-        return width
-    size, strides = array.itemsize, array.strides
-    rows = array.ndim == (2 if width > 1 else 1) and (width == 1 or strides[1] == size)
-    return strides[0] // size if rows and strides[0] >= width * size and strides[0] % size == 0 else -1
+def _steps(array: np.ndarray, width: int) -> tuple[int, int]:
+    """Steps in numbers from ray to ray, and from one number of a ray to the next, if they are constant; or else -1 first."""
+    size, rays = array.itemsize, array.ndim - (width > 1)
+    apart = array.strides[-1] if width > 1 else size
+    axes = [(n, stride) for n, stride in zip(array.shape[:rays], array.strides[:rays], strict=True) if n > 1]
+    rows = all(a[1] == b[0] * b[1] for a, b in itertools.pairwise(axes))  # one axis is as good as these
+    step = axes[-1][1]
+    if rows and 0 < step < _FAR * size and 0 < apart < _FAR * size and step % size == 0 and apart % size == 0:
+        return step // size, apart // size
+    return -1, 1

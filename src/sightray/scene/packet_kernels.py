@@ -23,6 +23,7 @@ from sightray.bvh.bvh8 import int_at
 from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
 from sightray.bvh.packets import PACKETS, ROOM_WORDS, any_rays, closest_rays, fast_rays
 from sightray.mathlib.lanes import (
+    load16,
     load16d,
     mask16,
     put_bytes16,
@@ -32,6 +33,7 @@ from sightray.mathlib.lanes import (
     store16d,
     transpose16,
     transpose16d,
+    widen16,
 )
 from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64, i64
@@ -39,12 +41,13 @@ from sightray.mathlib.table import Table, advance, f64_at, f64_put, i32_put, i64
 from sightray.mathlib.transform import transform_point, transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.scene.crossings import MESH
-from sightray.scene.query_kernels import LOOK, number_at, triple_at
+from sightray.scene.query_kernels import LOOK, number_at, step_of, triple_at
 from sightray.scene.world import ITEMS
 
 FEW_ITEMS = 4
 RAYS = 16 * PACKETS  # that go together
-SINGLE_ROWS, DOUBLE_ROWS = 7, 6  # forms of contiguous (n, 3) arrays
+SINGLE_ROWS, DOUBLE_ROWS = 1 << 32 | 7, 1 << 32 | 6  # forms of contiguous (n, 3) arrays
+SINGLE_COLUMNS, DOUBLE_COLUMNS = 3, 2  # the low halves of the forms of (3, n) arrays
 
 
 @kernel
@@ -62,6 +65,12 @@ def fill_triples(column: Table, form: i64, first: i64, count: i64, packet: Table
         transpose16(column, 3 * first, packet, at)
     elif count == 16 and form == DOUBLE_ROWS:
         transpose16d(column, 3 * first, packet, at)
+    elif count == 16 and form & 0xFFFFFFFF == SINGLE_COLUMNS:
+        for axis in range(3):
+            store16d(packet, at + 16 * axis, widen16(load16(column, first + (form >> 32) * axis)))
+    elif count == 16 and form & 0xFFFFFFFF == DOUBLE_COLUMNS:
+        for axis in range(3):
+            store16d(packet, at + 16 * axis, load16d(column, first + (form >> 32) * axis))
     else:
         for lane in range(count):
             put_lane(packet, at, lane, triple_at(column, form, first + lane))
@@ -75,12 +84,12 @@ def fill_packet(
     """Read up to sixteen rays; lanes without one end before they begin."""
     fill_triples(origins, o_form, first, count, packet, ORIGIN)
     fill_triples(directions, d_form, first, count, packet, DIRECTION)
-    if e_form <= 1 and count == 16:
+    if step_of(e_form) == 0 and count == 16:
         store16d(packet, END, splat16d(number_at(ends, e_form, 0)))
     else:
         store16d(packet, END, splat16d(math.nan))
         for lane in range(count):
-            f64_put(packet, END + lane, number_at(ends, e_form, (e_form >> 1) * (first + lane)))
+            f64_put(packet, END + lane, number_at(ends, e_form, step_of(e_form) * (first + lane)))
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Rays in batches: kernels that read them where the user keeps them.
 
-A *column* of a batch (origins, directions, ends) is a table and a **form**: twice the step from ray to ray in numbers
-(0 if all rays share one), plus one if the numbers are single precision.
+A *column* of a batch (origins, directions, ends) is a table and a **form**. Its lowest bit is set if the numbers are single
+precision; the other 31 bits of its low half are the step from ray to ray in numbers (0 if all rays share one), its high half
+is the step from one number of a ray to the next.
 
 What is no ray misses: an origin or direction that is not finite, a direction of length zero, t_max <= t_min.
 """
@@ -32,16 +33,24 @@ def number_at(column: Table, form: i64, index: i64) -> f64:
 
 
 @kernel
+def step_of(form: i64) -> i64:
+    """Numbers from ray to ray."""
+    return (form >> 1) & 0x7FFFFFFF
+
+
+@kernel
 def triple_at(column: Table, form: i64, ray: i64) -> Vec3:
     """Three numbers of a column."""
-    at = (form >> 1) * ray
-    return Vec3(number_at(column, form, at), number_at(column, form, at + 1), number_at(column, form, at + 2))
+    at, apart = step_of(form) * ray, form >> 32
+    return Vec3(
+        number_at(column, form, at), number_at(column, form, at + apart), number_at(column, form, at + 2 * apart)
+    )  # fmt: skip
 
 
 @kernel
 def end_at(column: Table, form: i64, ray: i64, o: Vec3, d: Vec3) -> f64:
     """Where a ray ends; NaN, before which nothing is met, if it is none."""
-    return number_at(column, form, (form >> 1) * ray) if is_ray(o, d) else math.nan
+    return number_at(column, form, step_of(form) * ray) if is_ray(o, d) else math.nan
 
 
 @kernel

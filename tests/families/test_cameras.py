@@ -53,6 +53,8 @@ EXAMPLES = {
         MovingCamera(camera=PinholeCamera(fx=500, pose=POSE, shutter_close=0.5), poses=[(0, VIEW), (1, POSE)]),
         MovingCamera(camera=OrthographicCamera(readout=0.1),
                      poses=[(-1, POSE), (1, Transform.translate(4, 0, 0) @ Transform(POSE))]),
+        MovingCamera(camera=PinholeCamera(fx=300, shutter_close=0.2), poses=[(0, VIEW), (1, POSE)],
+                     mount=Transform.translate(0.2, 0, 0) @ Transform.rotate((0, 1, 0), 20)),
     ],
     "CalibratedCamera": [
         CalibratedCamera(fx=500, fy=510, cx=330, cy=236.5, skew=1.5, k1=-0.28, k2=0.07, p1=1e-3, p2=-5e-4, pose=POSE),

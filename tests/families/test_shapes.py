@@ -24,9 +24,21 @@ from sightray.accelerators.item import (
 )
 from sightray.errors import SceneError
 from sightray.mathlib.scalars import i64
-from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, link, set_methods, vec3_at, vec3_put
+from sightray.mathlib.table import (
+    Space,
+    Table,
+    advance,
+    f64_at,
+    f64_put,
+    link,
+    set_methods,
+    table_at,
+    vec3_at,
+    vec3_put,
+)
 from sightray.mathlib.transform import Transform, put_columns
 from sightray.registry import members
+from sightray.shapes.base import facing
 
 RAY, OUT = 12, 24
 ALL = [pytest.param(e, id=f"{name}-{i}") for name, examples in EXAMPLES.items() for i, e in enumerate(examples)]
@@ -43,12 +55,14 @@ def trace(item: Table, rays: Table, out: Table, n: i64) -> None:
         f64_put(out, to + 1, float(h.prim))
         f64_put(out, to + 2, 1.0 if occluded_item(item, o, d, t_min, t_max) else 0.0)
         if h.prim >= 0:
-            s = item_surface(item, ItemHit(h.t, 0, h.prim, h.u, h.v), to_object(item, o + d * h.t))
+            p = to_object(item, o + d * h.t)
+            s = item_surface(item, ItemHit(h.t, 0, h.prim, h.u, h.v), p)
             f64_put(out, to + 3, s.u)
             f64_put(out, to + 4, s.v)
             vec3_put(out, to + 8, s.normal)
             vec3_put(out, to + 12, s.shading)
             vec3_put(out, to + 16, s.tangent)
+            vec3_put(out, to + 20, facing(table_at(item, MET), h, p))
 
 
 class Packer:
@@ -83,6 +97,7 @@ class Traced:
         (native(trace) if compiled else trace)(item, Table(rays), Table(out), len(o))
         self.t, self.prim, self.dark, self.u, self.v = out[:, 0], out[:, 1], out[:, 2] > 0, out[:, 3], out[:, 4]
         self.normal, self.shading, self.tangent = out[:, 8:11], out[:, 12:15], out[:, 16:19]
+        self.facing = out[:, 20:23]
         self.hit = np.isfinite(self.t)
         self.p = o + d * np.where(self.hit, self.t, 0)[:, None]
 
@@ -170,6 +185,17 @@ def gradient(g, p, h):
 
 def test_there_are_examples_of_every_shape():
     assert set(EXAMPLES) == set(members("shapes"))
+
+
+@pytest.mark.parametrize("example", ALL)
+def test_the_normal_alone_is_that_of_the_surface_and_flat_primitives_have_one(example):
+    """Labels compute it once for what is flat."""
+    seen = Traced(example.shape, *rays_for(example.shape))
+    np.testing.assert_array_equal(seen.facing[seen.hit], seen.normal[seen.hit])
+    if type(example.shape).flat:
+        for primitive in np.unique(seen.prim[seen.hit]):
+            normals = seen.normal[seen.hit & (seen.prim == primitive)]
+            np.testing.assert_array_equal(normals, np.broadcast_to(normals[0], normals.shape))
 
 
 @pytest.mark.parametrize("example", ALL)

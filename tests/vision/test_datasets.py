@@ -333,6 +333,21 @@ def test_a_rolling_shutter_is_in_pictures_and_labels(tmp_path):
     make_dataset(path, tmp_path / "data", frames=1, samples=1, formats=["coco", "exr"])
 
 
+def test_a_pair_that_turns_under_a_rolling_shutter_has_disparity(tmp_path):
+    """f B over the depth in each row's own pose; the rig turns by 8 degrees while rows are read."""
+    text = SEQUENCE.replace("sequence:", "readout: 0.04\nsequence:").replace("speed: 40", "speed: 200")
+    take = load_recipe(write_recipe(tmp_path, text)).take(1)
+    assert take.stereo
+    for shot in photograph(take, [ExrWriter(names="instance,position")], 0):
+        labels, camera = shot.labels, take.cameras[shot.cameras[shot.camera]]
+        poses = camera.world_from_camera(camera.time_of(np.arange(32) + 0.5))
+        assert np.degrees(np.arccos(poses[0][:3, 2] @ poses[-1][:3, 2])) > 4
+        depth = np.einsum("rci,ri->rc", labels.position - poses[:, None, :3, 3], poses[:, :3, 2])
+        met = labels.instance >= 0
+        strength = camera.camera.intrinsics()[0, 0] * 0.1
+        np.testing.assert_allclose(labels.disparity[met], strength / depth[met], rtol=1e-9)
+
+
 # ---------------------------------------------------------------------------------------------------------- what goes wrong
 
 

@@ -99,8 +99,12 @@ def test_what_is_left_without_a_lens_is_opencvs_own_error_on_perfect_corners():
 
 @functools.cache
 def detector(refine: int = 1):
-    """One for all tests: the library's destructor frees the tag family before the detector that still holds it."""
-    return import_module("pupil_apriltags").Detector(families="tag36h11", quad_decimate=1.0, refine_edges=refine)
+    """One for all tests, and for ever: the library's destructor frees the tag family before the detector that still holds
+    it, which ends the process with an error.
+    """
+    kind = import_module("pupil_apriltags").Detector
+    kept = type("Kept", (kind,), {"__del__": lambda self: None})
+    return kept(families="tag36h11", quad_decimate=1.0, refine_edges=refine)
 
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.0, 4.0])

@@ -91,9 +91,24 @@ def carried(camera: sr.Camera, turn: float = 0.0) -> sr.MovingCamera:
     return sr.MovingCamera(camera=camera, poses=[(0.0, pose), (1.0, way.matrix @ pose)])
 
 
-@pytest.mark.parametrize("moving", [False, True], ids=["cameras stand", "cameras move"])
-def test_e4_disparity_of_what_moves_under_a_rolling_shutter_is_that_of_the_rows_own_depth(moving):
-    left, right = map(carried, rolling_pair()) if moving else rolling_pair()
+def on_a_rig(turn: float) -> list[sr.MovingCamera]:
+    """The pair on a rig that turns: the right one sits beside the left one, whose poses those of the rig are."""
+    left, right = rolling_pair()
+    aside = np.linalg.inv(left.world_from_camera()) @ right.world_from_camera()
+    poses = carried(left, turn).poses
+    return [
+        sr.MovingCamera(camera=camera, poses=poses, mount=mount) for camera, mount in ((left, None), (right, aside))
+    ]
+
+
+PAIRS = {
+    "cameras stand": rolling_pair(), "cameras move": tuple(map(carried, rolling_pair())), "cameras turn": on_a_rig(40),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_e4_disparity_of_what_moves_under_a_rolling_shutter_is_that_of_the_rows_own_depth(name):
+    (left, right), moving = PAIRS[name], name != "cameras stand"
     room = sr.Scene(drifting(BALL, SPEED, "ball"), FLOOR, drifting(CRATE, (0, 0.5, 0), "crate"))
     strength = CAMERA.intrinsics()[0, 0] * 0.2  # f B
     for camera, other in ((left, right), (right, left)):
@@ -105,12 +120,32 @@ def test_e4_disparity_of_what_moves_under_a_rolling_shutter_is_that_of_the_rows_
             depth = (labels.position[row, on] - pose[:3, 3]) @ pose[:3, 2]
             np.testing.assert_allclose(labels.disparity[row, on], strength / depth, rtol=1e-9)
         assert (labels.disparity[labels.instance < 0] == 0).all()
+        there = sr.label(room, "flow", "disparity", "instance", camera=camera, stereo=other, next=other)
+        seen, side = there.instance >= 0, 1 if camera is left else -1
+        np.testing.assert_allclose(-side * there.flow[seen][:, 0], there.disparity[seen], atol=1e-9)
+        assert np.abs(there.flow[seen][:, 1]).max() <= 1e-9  # the same row
+
+
+def test_a_mount_turns_with_what_carries_it():
+    """Midway through a turn by 90 degrees about the origin a camera that sits 2 m ahead stands on the arc, not the chord."""
+    ahead = sr.Transform.translate(0, 0, 2).matrix
+    turn = [(0.0, np.eye(4)), (1.0, sr.Transform.rotate((0, 1, 0), 90).matrix)]
+    camera = sr.MovingCamera(camera=CAMERA.replace(readout=0), poses=turn, mount=ahead)
+    half = np.array([np.sin(np.pi / 4), 0, np.cos(np.pi / 4)])
+    np.testing.assert_allclose(camera.world_from_camera(0.5)[:3, [2, 3]].T, [half, 2 * half], atol=1e-12)
+    at_half = camera.replace(camera=CAMERA.replace(readout=0, shutter_open=0.5, shutter_close=0.5))
+    target = sr.Sphere(center=5 * half, radius=0.5)
+    labels = sr.label(sr.Scene(target, camera=at_half), "depth", "ray_origin")
+    np.testing.assert_allclose(labels.ray_origin[20, 30], 2 * half, atol=1e-12)
+    assert abs(labels.depth[22, 30] - 2.5) < 1e-3
+    np.testing.assert_allclose(at_half.rays([30.5, 22.5])[1], half, atol=1e-12)
+    np.testing.assert_allclose(at_half.project(3 * half), [30.5, 22.5], atol=1e-9)
 
 
 @pytest.mark.parametrize(("pair", "message"), [
     (rolling_pair(readout=0.2), "in other rows of the other picture"),
     (rolling_pair(shutter_open=0.1, shutter_close=0.1), "in other rows of the other picture"),
-    (tuple(carried(camera, 30) for camera in rolling_pair()), "not rectified"),
+    (tuple(carried(camera, 30) for camera in rolling_pair()), "not rectified.* at the time of every row: see Moving"),
 ])  # fmt: skip
 def test_pairs_that_do_not_show_a_point_in_the_same_row_are_refused(pair, message):
     room = sr.Scene(drifting(BALL, SPEED, "ball"), FLOOR, camera=pair[0])

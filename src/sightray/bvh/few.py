@@ -129,7 +129,7 @@ def few_ray(mesh: Table, o: Vec3, d: Vec3, t_min: f64, t_max: f64) -> FewRay:
     o, d = (o - vec3_at(mesh, CENTER)) * scale, d * scale
     far, speed = max(1.0, max3(vabs(o))), max3(vabs(d))
     fits = far <= FARTHEST and 1.0 / FASTEST < speed < FASTEST and t_min < t_max
-    most = 4.0 * far / speed
+    most = 4.0 * far / max(speed, 1.0 / FASTEST)
     low = max(t_min, -most)
     return FewRay(
         o, splat16(o.x), splat16(o.y), splat16(o.z), splat16(d.x), splat16(d.y), splat16(d.z),

@@ -61,6 +61,9 @@ class MovingCamera(Camera):
     stands still. Size, shutter and readout are those of `camera`. With ``readout`` the rows of a picture are exposed
     one after another (rolling shutter), each from its own pose: what stands upright leans.
 
+    With `mount` poses are those of something that carries the camera, such as a rig or a car: the camera's own pose is
+    ``pose @ mount`` at every time, also between the poses, so cameras on one rig keep their places to one another.
+
     `rays` and `project` speak of the middle of the exposure of each row; with a rolling shutter a projection is the
     row at whose own time the point is seen there.
 
@@ -76,9 +79,13 @@ class MovingCamera(Camera):
     readout: float = derived_number("delay of the bottom row, s", lambda c: c.camera.readout)
     camera: Any = child("what is carried; its shutter decides when it looks", "cameras")
     poses: Motion = other("keyframes [seconds, world_from_camera]", _poses, plain=plain_motion)
+    mount: Any = other("where the camera sits on what is carried, a rigid 4x4 matrix", _rigid, default=None,
+                       plain=lambda mount: None if mount.is_identity else mount.matrix.tolist())  # fmt: skip
     _keys: Any = derived_array("keyframes", lambda c: c.poses.keys())
     _count: Any = derived_integer("number of keyframes", lambda c: len(c.poses.times))
-    _home: Any = derived_array("columns of the carried camera's own pose", lambda c: c.home().T.copy())
+    _home: Any = derived_array(
+        "columns of what the poses stand in for", lambda c: (c.home() @ c.mount.inverse).T.copy()
+    )
 
     @property
     def has_lens(self) -> bool:
@@ -95,7 +102,7 @@ class MovingCamera(Camera):
 
     def world_from_camera(self, time: Any = None) -> np.ndarray:
         """Pose at some times, (...) float, seconds: (..., 4, 4) float64; None: in the middle of the picture's exposure."""
-        return self.poses.matrices(self.time_of(self.height / 2) if time is None else time)
+        return self.poses.matrices(self.time_of(self.height / 2) if time is None else time) @ self.mount.matrix
 
     def time_of(self, y: Any) -> Any:
         """The middle of a row's exposure, seconds."""

@@ -60,9 +60,12 @@ def sense(
         with showing_progress(quiet) as progress:
             image = sr.render(loaded, samples=samples, seed=seed, threads=threads, progress=progress)
         about["picture"] = _save_picture(output, camera, camera.capture(image, seed=seed, frame=frame))
-    exact = sr.label(loaded, "depth", threads=threads).depth if devices else None
+    with showing_progress(quiet) as progress:
+        exact = sr.label(loaded, "depth", threads=threads, progress=progress).depth if devices else None
     for name, device in devices.items():
-        about[name] = _save_depth(output, name, device, device.capture(loaded, seed, frame, threads), exact)
+        with showing_progress(quiet) as progress:
+            depth = device.capture(loaded, seed, frame, threads, progress)
+        about[name] = _save_depth(output, name, device, depth, exact)
     facts = {"seed": seed, "frame": frame, "sensors": about}
     _write(output / "sensors.json", json.dumps(facts, indent=1).encode())
     print(f"{output}: {', '.join(about)}, {time.perf_counter() - began:.1f} s")

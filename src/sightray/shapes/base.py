@@ -5,7 +5,9 @@ normalised, so that the ray parameter t is the same number in both spaces. A sha
 
 - reports in `intersect` the nearest hit with ``t_min < t < t_max``, or `miss()`;
 - answers in `occluded` whether there is any (by default through `intersect`);
-- describes in `surface` the point that was hit: outward normal, shading normal, texture coordinates, tangent;
+- describes in `surface` the point that was hit: outward normal, shading normal, texture coordinates, tangent; and may
+  give the outward normal alone in `facing`, for those who need no more, or say by `flat` that it is the same all over a
+  primitive;
 - states in `bounds` a box in object space that contains it; infinite for surfaces without end.
 
 Intersections are computed in double precision. A `Hit` carries what `surface` needs beside the point: which
@@ -14,7 +16,7 @@ primitive or part was met, and up to two numbers of the shape's own choice.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -47,6 +49,7 @@ class Shape(Member, family="shapes"):
         "object to world", as_transform, default=None, plain=lambda t: None if t.is_identity else t.matrix.tolist()
     )
     name: str = text("label for people and datasets", default="")
+    flat: ClassVar[bool] = False  # whether each primitive has one geometric normal, whatever the point
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner of a box around the shape, in object space: two (3,) float64 arrays."""
@@ -99,3 +102,14 @@ def handedness(shape: Table, prim: i64) -> f64:
 @implements(handedness, Shape)
 def right_handed(shape: Table, prim: i64) -> f64:
     return 1.0
+
+
+@method(5)
+def facing(shape: Table, hit: Hit, p: Vec3) -> Vec3:
+    """The geometric normal of `surface` alone, for those who need no more."""
+    raise NotImplementedError
+
+
+@implements(facing, Shape)
+def facing_by_surface(shape: Table, hit: Hit, p: Vec3) -> Vec3:
+    return surface(shape, hit, p).normal

@@ -40,6 +40,7 @@ class Box(Shape):
     outside; on top and bottom v runs along -z. Part number: the face, in the order -x +x -y +y -z +z.
     """
 
+    flat = True
     lower: Point = vector("corner with the smallest coordinates", default=(-0.5, -0.5, -0.5), unit="m")
     upper: Point = vector("corner with the largest coordinates", default=(0.5, 0.5, 0.5), unit="m")
     faces = derived_array("frames of the six faces", _faces)

@@ -29,6 +29,7 @@ class Disk(Shape):
     axis of `Plane`; v from the inner edge (0) to the outer edge (1).
     """
 
+    flat = True
     center: Point = vector("centre", default=(0.0, 0.0, 0.0), unit="m")
     normal: Point = vector("direction of the outer side", default=(0.0, 1.0, 0.0), nonzero=True)
     radius: float = number("outer radius", default=1.0, above=0, unit="m")

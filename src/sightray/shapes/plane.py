@@ -26,6 +26,7 @@ class Plane(Shape):
     looks at the outer side. On a floor (normal +y), u runs along +x and v along -z.
     """
 
+    flat = True
     point: Point = vector("a point of the plane", default=(0.0, 0.0, 0.0), unit="m")
     normal: Point = vector("direction of the outer side", default=(0.0, 1.0, 0.0), nonzero=True)
     axis_u = derived_vector("unit axis of u", lambda plane: axes_across(plane.normal)[0])

@@ -52,6 +52,7 @@ class Polygon(Shape):
     Texture coordinates: metres from the first point along the axes of `Plane`.
     """
 
+    flat = True
     outline: np.ndarray = other("(n, 3) points of the border", _outline, unit="m", plain=lambda a: a.tolist())
     holes: tuple[np.ndarray, ...] = other("borders of the holes", _holes, default=(), unit="m",
                                           plain=lambda holes: [hole.tolist() for hole in holes])  # fmt: skip

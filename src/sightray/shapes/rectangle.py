@@ -34,6 +34,7 @@ class Rectangle(Shape):
     Texture coordinates: u and v themselves.
     """
 
+    flat = True
     corner: Point = vector("corner q where u = v = 0", default=(-0.5, -0.5, 0.0), unit="m")
     edge_u: Point = vector("from the corner along u", default=(1.0, 0.0, 0.0), unit="m", nonzero=True)
     edge_v: Point = vector("from the corner along v", default=(0.0, 1.0, 0.0), unit="m", nonzero=True)

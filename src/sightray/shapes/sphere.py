@@ -13,7 +13,7 @@ from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot
-from sightray.shapes.base import Shape, Surface, intersect, surface
+from sightray.shapes.base import Shape, Surface, facing, intersect, surface
 
 
 class Sphere(Shape):
@@ -67,3 +67,8 @@ def surface_of_sphere(sphere: Table, hit: Hit, p: Vec3) -> Surface:
     u = math.atan2(-n.z, n.x) / (2.0 * math.pi)
     v = 0.5 + math.asin(min(1.0, max(-1.0, n.y / f64_at(sphere, RADIUS)))) / math.pi
     return Surface(n, n, u - math.floor(u), v, Vec3(n.z, 0.0, -n.x) * (2.0 * math.pi))
+
+
+@implements(facing, Sphere)
+def facing_of_sphere(sphere: Table, hit: Hit, p: Vec3) -> Vec3:
+    return p - vec3_at(sphere, CENTER)

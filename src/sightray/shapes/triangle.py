@@ -27,6 +27,7 @@ class Triangle(Shape):
     Texture coordinates: the barycentric weights u of b and v of c.
     """
 
+    flat = True
     a: Point = vector("first corner", unit="m")
     b: Point = vector("second corner", unit="m")
     c: Point = vector("third corner", unit="m")

@@ -78,7 +78,8 @@ class Animation:
         """What a shutter sees that is open for `exposure` seconds around t: the scene, and cameras by name, in motion.
 
         With `readout`, the bottom row is exposed so many seconds after the top one, and the picture's middle row around t.
-        In that time, objects and cameras go from their poses at its begin to those at t, and on to those at its end.
+        In that time, objects and the camera, or the rig as a whole, go from their poses at its begin to those at t, and on
+        to those at its end.
         Labels of the middle of the exposure are those of `at`.
         """
         half = 0.5 * (exposure + readout)
@@ -88,12 +89,12 @@ class Animation:
             if (name := getattr(thing, "name", "")) in self.objects else thing
             for thing in self.scene.objects
         )  # fmt: skip
-        cameras = [self.cameras_at(s) for s in times]
+        poses = Motion([(s, next(iter(self.cameras_at(s).values())).world_from_camera()) for s in times])
         found: dict[str, Camera] = {}
-        for name, still in cameras[1].items():
-            poses = Motion([(s, there[name].world_from_camera()) for s, there in zip(times, cameras, strict=True)])
+        for name, still in self.cameras_at(t).items():
             rows = {"shutter_open": times[0], "shutter_close": times[0] + exposure, "readout": readout}
-            found[name] = MovingCamera(camera=still.replace(**rows), poses=poses)
+            mount = None if self.rig is None else self.rig.rig_from_camera[name]
+            found[name] = MovingCamera(camera=still.replace(**rows), poses=poses, mount=mount)
         return self.scene.replace(objects=objects, camera=next(iter(found.values()))), found
 
 

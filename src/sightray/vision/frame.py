@@ -21,19 +21,24 @@ from sightray.mathlib.table import Space, Table, aligned, i64_at, link, scratch,
 from sightray.mathlib.transform import put_columns
 from sightray.samplers.base import default_sampler
 from sightray.scene.compile import Item
+from sightray.scene.crossings import MESH
 from sightray.scene.parallel import run_chunks
 from sightray.scene.queries import asked
 from sightray.scene.world import FLAGS
 from sightray.vision import record as words
+from sightray.vision import shelf
 from sightray.vision.casting import cast_tile
 from sightray.vision.extents import extent
 from sightray.vision.layers.base import Layer, fill
 from sightray.vision.picking import BOX_WORDS, MOST_CASTS
 from sightray.vision.poses import object_pose
 from sightray.vision.rolling import Rolling
+from sightray.vision.sight import has_plane
 from sightray.vision.view import Motion, View
 
 _WHITTED, _SAMPLER = Whitted(), default_sampler()
+_STEPS = aligned((2, 16), np.float64)
+_STEPS[:] = np.arange(16) % 4, np.arange(16) // 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +192,7 @@ class Frame:
         for k, layer in enumerate(layers):
             deep = layer.columns_in(self)
             shape = (rows, columns) if deep == 1 and layer.columns == 1 else (rows, columns, deep)
-            arrays.append(np.empty(shape, layer.dtype))
+            arrays.append(shelf.empty(shape, layer.dtype))
             link(handles, k, tables.row_of(layer))
             link(outputs, k, space.array(arrays[k]))
         tables.row_of(self.view.camera)
@@ -205,8 +210,10 @@ class Frame:
         link(row, words.WORLD, self.compiled.world)
         link(row, words.CAMERA, self.compiled.tables.row_of(self.view.camera))
         n = len(self.compiled.items)
-        kinds = np.append(ready.kinds.view(np.int32)[:n], 1).astype(np.int32)  # 1: the meshes that were put together
+        kinds = np.append(ready.kinds.view(np.int32)[:n], MESH).astype(np.int32)  # the last: the meshes put together
+        kinds[[k for k, item in enumerate(self.compiled.items) if item.shape.flat and kinds[k] != MESH]] = words.FLAT
         casts = self._casts()
+        link(row, words.LATTICE, space.array(_STEPS) if scale == 1 and has_plane(self.view.camera) else None)
         link(row, words.KINDS, space.array(kinds))
         link(row, words.CASTS, space.array(np.array([*casts, 0], np.int32)))
         boxes = aligned((len(casts) + 1, BOX_WORDS), np.float64)

@@ -68,17 +68,18 @@ def make_labels(scene: Scene, layers: tuple[Any, ...], *, camera: Any = None, ne
 def compute(frame: Frame, wanted: dict[str, Layer]) -> None:
     """Fill ``frame.values`` with layers and all that they need: pixel layers in one pass, then the others in order."""
     order: dict[str, Layer] = {}
-
-    def visit(layer: Layer) -> None:
-        if layer.label not in order:
-            for name in layer.needs(frame):
-                visit(wanted.get(name) or as_layer(name))
-            order[layer.label] = layer
-
     for layer in wanted.values():
-        visit(layer)
+        put_in_order(layer, order, frame, wanted)
     pixelwise = [layer for layer in order.values() if layer.pixelwise(frame)]
     frame.values.update(zip([layer.label for layer in pixelwise], frame.run(pixelwise), strict=True))
     for name, layer in order.items():
         if name not in frame.values:
             frame.values[name] = layer.compute(frame)
+
+
+def put_in_order(layer: Layer, order: dict[str, Layer], frame: Frame, wanted: dict[str, Layer]) -> None:
+    """Add a layer to ``order``, after all that it needs."""
+    if layer.label not in order:
+        for name in layer.needs(frame):
+            put_in_order(wanted.get(name) or as_layer(name), order, frame, wanted)
+        order[layer.label] = layer

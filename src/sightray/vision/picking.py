@@ -14,10 +14,11 @@ from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.bvh.bvh8 import int_at
+from sightray.cameras.base import _CORNER, _DOWN, _EYE, _RIGHT
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, i64_at, i64_put, table_at, vec3_at
+from sightray.mathlib.table import Table, f64_at, i64_at, i64_put, is_null, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, vabs, vmax, vmin
-from sightray.vision.record import BOXES, CAST_COUNT, CASTS, DIRECTION, ORIGIN, record_at
+from sightray.vision.record import BLOCK, BOXES, CAMERA, CAST_COUNT, CASTS, DIRECTION, LATTICE, ORIGIN, X, Y, record_at
 
 MOST_CASTS = 64  # items up to which it is worth while to look at the boxes of all of them
 MOST_PICKED = 12  # items up to which asking each of them is faster than the tree
@@ -55,6 +56,23 @@ def interval_ray(records: Table, count: i64) -> IntervalRay:
 
 
 @kernel
+def interval_ray_of_pinhole(frame: Table, records: Table) -> IntervalRay:
+    """The interval ray of a whole tile: directions are linear in the pixel, so those of its corners are the outermost."""
+    camera = table_at(frame, CAMERA)
+    eye = vec3_at(camera, _EYE)
+    a, b = direction_of(camera, record_at(records, 0)), direction_of(camera, record_at(records, 19))
+    c, d = direction_of(camera, record_at(records, 44)), direction_of(camera, record_at(records, 63))
+    return IntervalRay(eye, eye, vmin(vmin(a, b), vmin(c, d)), vmax(vmax(a, b), vmax(c, d)))
+
+
+@kernel
+def direction_of(camera: Table, record: Table) -> Vec3:
+    """The direction of a pinhole's ray, not of unit length."""
+    x, y = f64_at(record, X), f64_at(record, Y)
+    return vec3_at(camera, _CORNER) + vec3_at(camera, _RIGHT) * x + vec3_at(camera, _DOWN) * y
+
+
+@kernel
 def until(times: Times, speed: f64, way: f64) -> Times:
     """The part of times at which ``t * speed <= way``."""
     if speed > 0.0:
@@ -81,7 +99,9 @@ def pick_items(frame: Table, records: Table, count: i64, picked: Table) -> i64:
     casts, boxes, total = table_at(frame, CASTS), table_at(frame, BOXES), i64_at(frame, CAST_COUNT)
     if total == 0:
         return -1
-    rays, n = interval_ray(records, count), 0
+    pinhole = count == BLOCK and not is_null(table_at(frame, LATTICE))
+    rays = interval_ray_of_pinhole(frame, records) if pinhole else interval_ray(records, count)
+    n = 0
     for k in range(total):
         if may_meet(rays, vec3_at(boxes, BOX_WORDS * k), vec3_at(boxes, BOX_WORDS * k + 4)):
             if n == MOST_PICKED:

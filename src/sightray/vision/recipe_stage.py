@@ -204,7 +204,7 @@ class Stage:
         return Take(
             frame=frame, scene=scene, cameras=cameras, following=following, later=later, classes=self.classes,
             sequence=self.sequence if length > 1 else 0, step=step if length > 1 else frame,
-            time=time if length > 1 else frame / rate, stereo=rig is not None and rig.rectified and not readout,
+            time=time if length > 1 else frame / rate, stereo=rig is not None and rig.rectified,
             blurred=blurred, shutters=shutters, targets=tuple(self.targets) if "place" in self.top else None,
             seeds=tuple(seeds.at(k).whole() for k in range(len(cameras))), note={"left_out": self.left_out},
             sensor=self.sensor, depth_sensors=self.depth_sensors,

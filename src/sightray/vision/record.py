@@ -18,6 +18,7 @@ BLOCK = SIDE * SIDE
 ORIGIN, DIRECTION, POSITION, NORMAL, SHADING = 0, 4, 8, 12, 16
 T, ITEM, PRIM, U, V, TEXTURE_U, TEXTURE_V = 20, 21, 22, 23, 24, 25, 26
 PIXEL, X, Y = 27, 28, 29  # number of the pixel, row by row; continuous coordinates of its centre
+SEEN = 30  # item and primitive in one word: the same for pixels that show the same; negative for nothing
 RECORD_WORDS = 32
 
 # Words of a frame: the picture being labelled.
@@ -26,12 +27,14 @@ COLUMNS, ROWS, SCALE, DETAIL = 5, 6, 7, 8  # SCALE: rays along a pixel's side; C
 CLASS_OF_ITEM, MATERIAL_OF_ITEM, OBJECT_FRAMES = 9, 10, 11
 NEXT, PREVIOUS, STEREO = 12, 13, 14  # rows of `view.Motion`, or null
 INTEGRATOR, SAMPLER, PATH_NAMES, BOXES = 15, 32, 33, 34  # BOXES: of the items that are cast at, see `vision.picking`
+LATTICE = 35  # of a pinhole whose rows share one time: steps of x and y in 4 x 4 pixels, else null
 CAMERA_FROM_WORLD = 16
 FRAME_WORDS = 40
 OBJECT_FRAME_WORDS = 24  # of each item: object_from_world of its object, then centre and diagonal of its box
 
 # Values of DETAIL: what is computed of a hit beside t, item and primitive. FACE: position and geometric normal.
 RAY_ONLY, POINT, FACE, SURFACE = 0, 1, 2, 3
+FLAT = 2  # of KINDS, beside those of `scene.crossings`: no mesh, but each primitive has one normal
 
 
 @kernel

@@ -28,7 +28,7 @@ FAR = 1e15  # metres; what is farther does not move in any picture, to the last 
 NEAR = 1e-9  # of the way to a point: what is met closer to it is the surface that it lies on
 
 # Words of a motion row: how items of one view moved to another, and where that sees them.
-LINEAR, MOVES, DEFORMED, FACES, VANISHED, SIDE = 0, 1, 2, 3, 4, 5
+LINEAR, MOVES, DEFORMED, FACES, VANISHED, SIDE, STILL = 0, 1, 2, 3, 4, 5, 6  # STILL: nothing has moved or gone
 PROJECTION = 8
 MOTION_WORDS = 24
 
@@ -178,6 +178,9 @@ class Motion:
         self.item = np.full(len(items), -1)
         self.moves = np.tile(np.eye(4), (len(items), 1, 1))
         self.vertices: list[np.ndarray | None] = [None] * len(items)
+        if before.scene is after.scene:
+            self.item = np.arange(len(items))
+            return
         for index, item in enumerate(items):
             theirs = places.get(partner[item.object], []) if partner[item.object] >= 0 else []
             place = turn[item.object]
@@ -194,8 +197,7 @@ class Motion:
     @property
     def side(self) -> float:
         """1 if the other camera stands to the right, -1 to the left."""
-        x = (self.before.camera_from_world @ self.after.world_from_camera)[0, 3]
-        return 1.0 if x >= 0 else -1.0
+        return 1.0 if self.before.camera_from_world[0] @ self.after.world_from_camera[:, 3] >= 0 else -1.0
 
     def row(self, space: Space) -> Table:
         """The motion as kernels read it."""
@@ -214,6 +216,7 @@ class Motion:
         link(row, FACES, faces)
         link(row, VANISHED, space.array(gone))
         row.view(np.int64)[LINEAR] = self.linear
+        row.view(np.int64)[STILL] = self.before.scene is self.after.scene
         row.view(np.float64)[SIDE] = self.side
         if self.linear:
             matrix = np.zeros((4, 4))

@@ -6,10 +6,13 @@ beside the exact ones of `sightray.label`, pixel by pixel. All its noise is a fu
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from sightray.engine.progress import Callback, Progress
 from sightray.engine.run import run
 from sightray.errors import SceneError
 from sightray.fields import Point
@@ -20,7 +23,7 @@ from sightray.lights.projector import ProjectorLight
 from sightray.mathlib.transform import Transform
 from sightray.registry import Member, members
 from sightray.samplers.base import default_sampler
-from sightray.scene.compile import compile_scene, require_view
+from sightray.scene.compile import Compiled, compile_scene, require_view
 from sightray.scene.scene import Scene
 from sightray.vision.view import is_linear
 
@@ -28,7 +31,8 @@ from sightray.vision.view import is_linear
 class DepthSensor(Member, family="vision.depth_sensors"):
     """Base of all depth sensors."""
 
-    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> np.ndarray:
+    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                progress: Callback | None = None) -> np.ndarray:  # fmt: skip
         """The depths that the sensor delivers.
 
         Parameters
@@ -36,6 +40,7 @@ class DepthSensor(Member, family="vision.depth_sensors"):
         scene : one with a camera, whose picture the depths belong to.
         seed, frame : whole numbers >= 0; the noise is a function of both, so that every frame can be made by itself.
         threads : by default one for every core. Depths do not depend on it.
+        progress : called with a `Progress` now and then, while kernels are compiled and pictures are made.
 
         Returns
         -------
@@ -74,20 +79,48 @@ def require_pinhole(sensor: DepthSensor, scene: Scene) -> None:
 
 
 def mean_light(
-    scene: Scene, integrator: Any = None, *, samples: int, seed: int, threads: int | None = None
-) -> np.ndarray:
+    scene: Scene, integrator: Any = None, *, samples: int, seed: int, threads: int | None = None,
+    progress: Callback | None = None,
+) -> np.ndarray:  # fmt: skip
     """What `sightray.render` would make, before it is rounded to single precision: (h, w, 3) float64.
 
     The scene's own integrator counts, else `Whitted`.
     """
     require_view(scene)
-    outcome = run(compile_scene(scene), integrator or scene.integrator or Whitted(), default_sampler(), BoxFilter(),
-                  samples=samples, seed=seed, threads=threads)  # fmt: skip
+    return light_of(compile_scene(scene), integrator, samples=samples, seed=seed, threads=threads, progress=progress)
+
+
+def light_of(
+    compiled: Compiled, integrator: Any = None, *, samples: int, seed: int, threads: int | None = None,
+    progress: Callback | None = None,
+) -> np.ndarray:  # fmt: skip
+    """`mean_light` of a scene whose tables are there."""
+    light = integrator or compiled.scene.integrator or Whitted()
+    outcome = run(compiled, light, default_sampler(), BoxFilter(), samples=samples, seed=seed, threads=threads,
+                  progress=progress)  # fmt: skip
     if not outcome.complete:
         raise KeyboardInterrupt
     pixels = outcome.film.pixels
     weight = pixels[..., WEIGHT : WEIGHT + 1]
     return np.divide(pixels[..., SUM : SUM + 3], weight, out=np.zeros_like(pixels[..., :3]), where=weight > 0)
+
+
+def one_of(progress: Callback | None, count: int) -> Callable[[int], Callback | None]:
+    """What the pictures of a series report to, by their number: `progress` is told how far all `count` of them are."""
+    began, rays = time.perf_counter(), [0] * count
+
+    def of(index: int) -> Callback | None:
+        def tell(now: Progress) -> None:
+            if now.stage != "compile":
+                rays[index] = now.rays
+                now = now._replace(done=index * now.total + now.done, total=count * now.total, rays=sum(rays),
+                                   seconds=time.perf_counter() - began)  # fmt: skip
+            if progress is not None:
+                progress(now)
+
+        return None if progress is None else tell
+
+    return of
 
 
 def sight_rays(camera: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -19,11 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from sightray.engine.progress import Callback
 from sightray.errors import SceneError
 from sightray.fields import integer, number
 from sightray.lights.projector import ProjectorLight
 from sightray.scene.scene import Scene
-from sightray.vision.depth_sensors.base import DepthSensor, mean_light, projector_beside, require_pinhole
+from sightray.vision.depth_sensors.base import DepthSensor, mean_light, one_of, projector_beside, require_pinhole
 from sightray.vision.rigs import stereo_rig
 from sightray.vision.sensor import Sensor, noise_source, sensor
 
@@ -72,24 +73,25 @@ class MatchedStereo(DepthSensor):
     def accept(self, scene: Scene) -> None:
         require_pinhole(self, scene)
 
-    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> np.ndarray:
-        disparity = self.match(*self.pictures(scene, seed, frame, threads))
+    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                progress: Callback | None = None) -> np.ndarray:  # fmt: skip
+        disparity = self.match(*self.pictures(scene, seed, frame, threads, progress))
         camera: Any = scene.camera
         reach = camera.intrinsics()[0, 0] * self.baseline
         return np.where(disparity > 0, reach / np.where(disparity > 0, disparity, 1.0), 0.0)
 
     def pictures(
-        self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None
+        self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None, progress: Callback | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """The numbers that the left and the right eye deliver, (h, w) each; arguments as in `capture`."""
         self.accept(scene)
         camera, random = scene.camera, noise_source("MatchedStereo", seed, frame)
         if self.dots > 0:
             scene = scene.replace(objects=(*scene.objects, self.projector(camera)))
-        found = []
-        for eye in stereo_rig(camera, self.baseline).at(camera.world_from_camera()).values():
+        found, part = [], one_of(progress, 2)
+        for k, eye in enumerate(stereo_rig(camera, self.baseline).at(camera.world_from_camera()).values()):
             light = mean_light(scene.replace(camera=eye), samples=self.samples, seed=int(random.integers(2**63)),
-                               threads=threads).mean(axis=-1)  # fmt: skip
+                               threads=threads, progress=part(k)).mean(axis=-1)  # fmt: skip
             found.append(self.sensor.numbers(self.sensor.collected(light), random))
         return found[0], found[1]
 

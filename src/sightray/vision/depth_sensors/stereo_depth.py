@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from sightray.engine.progress import Callback
 from sightray.errors import SceneError
 from sightray.fields import number
 from sightray.scene.scene import Scene
@@ -57,13 +58,14 @@ class StereoDepth(DepthSensor):
     def accept(self, scene: Scene) -> None:
         require_pinhole(self, scene)
 
-    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> np.ndarray:
+    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                progress: Callback | None = None) -> np.ndarray:  # fmt: skip
         self.accept(scene)
         camera: Any = scene.camera
         other = stereo_rig(camera, self.baseline).at(camera.world_from_camera())["right"]
         pair = scene.replace(camera=other)
         exact = make_labels(scene, ("disparity", "occlusion", "out_of_view", "instance"), stereo=pair, next=pair,
-                            threads=threads)  # fmt: skip
+                            threads=threads, progress=progress)  # fmt: skip
 
         # What is matched, and how exactly.
         random = noise_source("StereoDepth", seed, frame)

@@ -21,10 +21,14 @@ import math
 
 import numpy as np
 
+from sightray.engine.progress import Callback
 from sightray.errors import SceneError
 from sightray.fields import integer, number
+from sightray.lights.projector import PIXELS
+from sightray.mathlib.table import link
+from sightray.scene.compile import compile_scene, require_view
 from sightray.scene.scene import Scene
-from sightray.vision.depth_sensors.base import DepthSensor, mean_light, projector_beside, sight_rays
+from sightray.vision.depth_sensors.base import DepthSensor, light_of, one_of, projector_beside, sight_rays
 from sightray.vision.sensor import Sensor, noise_source, sensor
 
 
@@ -77,8 +81,9 @@ class StructuredLight(DepthSensor):
         waves = [0.5 + 0.5 * np.cos(2 * math.pi * (x / self.period - k / self.shifts)) for k in range(self.shifts)]
         return np.array([one for bit in bits for one in (bit, 1 - bit)] + waves, np.float64)
 
-    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> np.ndarray:
-        column = self.decode(self.pictures(scene, seed, frame, threads))
+    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                progress: Callback | None = None) -> np.ndarray:  # fmt: skip
+        column = self.decode(self.pictures(scene, seed, frame, threads, progress))
         origins, directions = sight_rays(scene.camera)
         focal = 0.5 * self.rows / math.tan(math.radians(self.vfov) / 2)
         slope = (column - 0.5 * self.columns) / focal  # of the column's plane: x = baseline + slope z
@@ -89,18 +94,23 @@ class StructuredLight(DepthSensor):
             depth = origins[..., 2] + t * directions[..., 2]
         return np.where(np.isfinite(depth) & (t > 0) & (depth > 0), depth, 0.0)
 
-    def pictures(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> np.ndarray:
+    def pictures(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                 progress: Callback | None = None) -> np.ndarray:  # fmt: skip
         """The numbers of all pictures, (n, h, w), in the order of `patterns`; arguments as in `capture`."""
         self.accept(scene)
+        require_view(scene)
         random = noise_source("StructuredLight", seed, frame)
         render_seed = int(random.integers(2**63))
-        found = []
-        for pattern in self.patterns():
-            stripes = np.tile(pattern, (self.rows, 1))
-            projector = projector_beside(scene.camera, self.baseline, stripes, self.vfov, self.intensity)
-            lit = scene.replace(objects=(*scene.objects, projector))
-            light = mean_light(lit, samples=self.samples, seed=render_seed, threads=threads).mean(axis=-1)
-            found.append(self.sensor.numbers(self.sensor.collected(light), random))
+        patterns, found = self.patterns(), []
+        white = np.ones((self.rows, self.columns))
+        projector = projector_beside(scene.camera, self.baseline, white, self.vfov, self.intensity)
+        lit = compile_scene(scene.replace(objects=(*scene.objects, projector)))
+        thrown, part = np.empty((self.rows, self.columns, 3), np.float32), one_of(progress, len(patterns))
+        for k, pattern in enumerate(patterns):  # the tables stay, but for what the projector shows
+            thrown[:] = pattern[:, np.newaxis]
+            link(lit.tables.row_of(projector), PIXELS, lit.tables.space.array(thrown))
+            light = light_of(lit, samples=self.samples, seed=render_seed, threads=threads, progress=part(k))
+            found.append(self.sensor.numbers(self.sensor.collected(light.mean(axis=-1)), random))
         return np.array(found)
 
     def decode(self, numbers: np.ndarray) -> np.ndarray:

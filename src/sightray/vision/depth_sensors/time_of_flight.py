@@ -24,13 +24,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sightray.engine.progress import Callback
 from sightray.errors import SceneError
 from sightray.fields import Point, flag, integer, number, other, vector
 from sightray.integrators.phasor import SPEED_OF_LIGHT, PhasorTracer
 from sightray.lights.base import Light
 from sightray.lights.point import PointLight
 from sightray.scene.scene import Scene
-from sightray.vision.depth_sensors.base import DepthSensor, beside, mean_light, sight_rays
+from sightray.vision.depth_sensors.base import DepthSensor, beside, mean_light, one_of, sight_rays
 from sightray.vision.sensor import Sensor, noise_source, sensor
 
 NOTHING = 1e-6  # electrons: what rounding leaves of no swing at all
@@ -108,22 +109,24 @@ class TimeOfFlight(DepthSensor):
         farthest = 0.5 * SPEED_OF_LIGHT / math.gcd(*(round(f) for f in self.frequencies))
         return farthest if self.reach is None else min(farthest, self.reach)
 
-    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> np.ndarray:
-        return self.measure(scene, seed, frame, threads).depth
+    def capture(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                progress: Callback | None = None) -> np.ndarray:  # fmt: skip
+        return self.measure(scene, seed, frame, threads, progress).depth
 
-    def measure(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None) -> Flight:
+    def measure(self, scene: Scene, seed: int = 0, frame: int = 0, threads: int | None = None,
+                progress: Callback | None = None) -> Flight:  # fmt: skip
         """All that the sensor knows; arguments as in `capture`."""
         self.accept(scene)
         random = noise_source("TimeOfFlight", seed, frame)
         options: dict[str, Any] = {"samples": self.samples, "seed": int(random.integers(2**63)), "threads": threads}
-        steady = np.zeros(())
+        steady, part = np.zeros(()), one_of(progress, 1 + len(self.frequencies))
         if self.passband > 0:
-            steady = self.passband * mean_light(scene, **options)[..., 0]
+            steady = self.passband * mean_light(scene, **options, progress=part(0))[..., 0]
         lit = self.lit(scene)
         phase, amplitude, full = [], [], np.zeros((), bool)
-        for frequency in self.frequencies:
-            cosine, sine, light = np.moveaxis(
-                mean_light(lit, PhasorTracer(frequency=frequency, max_depth=self.max_depth), **options), -1, 0)  # fmt: skip
+        for k, frequency in enumerate(self.frequencies, 1):
+            swing = PhasorTracer(frequency=frequency, max_depth=self.max_depth)
+            cosine, sine, light = np.moveaxis(mean_light(lit, swing, **options, progress=part(k)), -1, 0)
             c, s, cut = self._exposed(steady + light, cosine, sine, random)
             phase.append(np.arctan2(s, c) % (2 * math.pi))
             amplitude.append(np.hypot(c, s))

@@ -27,8 +27,11 @@ class DisparityLayer(Layer):
     """Disparity to the other picture of a rectified pair, `stereo`: x in the left picture minus x in the right one.
 
     Where the two cameras share their intrinsics, f B / z with baseline B; it is the same number in both pictures, and 0
-    at infinity. Cameras may move together, and objects while rows are exposed one after the other: both cameras then
-    expose a row at the same time, so a point is in the same row of both pictures, and z is its depth at that time.
+    at infinity. Cameras may move and turn together, as a rig whose second camera has a `mount`, and objects while rows are
+    exposed one after the other: both cameras then expose a row at the same time, so a point is in the same row of both
+    pictures, and z is its depth at that time. Where the cameras' rows have different times, or the cameras another place
+    to one another in each row, what moves is seen in another row: a disparity, one number, cannot say where. There
+    `correspondence` and `flow`, with the other camera as `next`, do.
 
     Raises
     ------
@@ -67,7 +70,7 @@ def require_rectified(a: View, b: View, rolls: bool) -> None:
     if moving and rows[0] != rows[1]:
         raise SceneError(
             f"label: stereo: what moves is in other rows of the other picture, for {', '.join(ROWS)} are {rows[0]} and "
-            f"{rows[1]}; allowed: the same"
+            f"{rows[1]}; allowed: the same. Or ask for correspondence, with the other camera as next"
         )
     poses = [row_poses(view) for view in (a, b)]
     relative = np.linalg.inv(poses[0]) @ poses[1]
@@ -76,9 +79,11 @@ def require_rectified(a: View, b: View, rolls: bool) -> None:
     aside = (np.abs(relative[:, 1:3, 3]).max(axis=1) / apart).max()
     lens = np.abs((a.intrinsics - b.intrinsics)[[0, 1, 1], [0, 1, 2]]).max() / a.intrinsics[0, 0]  # type: ignore
     if max(turned, aside, lens) > EXACT:
+        always = ", at the time of every row: see MovingCamera.mount" if len(relative) > 1 else ""
         raise SceneError(
             f"label: stereo: the cameras are not rectified (turned by {turned:.2g}, displaced from the x axis by "
-            f"{aside:.2g}, intrinsics off by {lens:.2g}); allowed: side by side, with the same axes"
+            f"{aside:.2g}, intrinsics off by {lens:.2g}); allowed: side by side, with the same axes{always}. Or ask for "
+            "correspondence, with the other camera as next"
         )
 
 

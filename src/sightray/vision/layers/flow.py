@@ -13,8 +13,8 @@ from sightray.mathlib.table import Table, advance, f64_at, i64_at, table_at, vec
 from sightray.mathlib.transform import transform_point, transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.vision.layers.base import Layer, fill
-from sightray.vision.record import DIRECTION, NEXT, PIXEL, POINT, PREVIOUS, X, Y, is_met, put_pair, record_at
-from sightray.vision.view import PROJECTION, is_gone, moved_point
+from sightray.vision.record import DIRECTION, NEXT, PIXEL, POINT, POSITION, PREVIOUS, X, Y, is_met, put_pair, record_at
+from sightray.vision.view import PROJECTION, STILL, is_gone, moved_point
 
 
 class _Flow(Layer):
@@ -53,12 +53,14 @@ def pixel_centres(width: int, height: int) -> np.ndarray:
 @kernel
 def fill_flow_to(motion: Table, records: Table, count: i64, out: Table) -> None:
     """Flow by the projection matrix of the other camera."""
-    camera = advance(motion, PROJECTION)
+    camera, still = advance(motion, PROJECTION), i64_at(motion, STILL) != 0
     for i in range(count):
         record = record_at(records, i)
         h = Vec3(0.0, 0.0, -1.0)
         if not is_met(record):
             h = transform_vector(camera, 0, vec3_at(record, DIRECTION))
+        elif still:
+            h = transform_point(camera, 0, vec3_at(record, POSITION))
         elif not is_gone(motion, record):
             h = transform_point(camera, 0, moved_point(motion, record))
         dx, dy = math.nan, math.nan

@@ -24,8 +24,8 @@ from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
-# Where integrators want pixels together, edges of tiles cut them apart. So tiles are wide, and lie elsewhere every time that
-# pixels have taken so many samples: no edge stays where it could be seen.
+# Where integrators want pixels together, edges of tiles cut them apart. So tiles are wide, and lie elsewhere in each pass
+# and every time that all pixels have taken so many samples: no edge stays where it could be seen.
 WIDE_TILE, AT_ONCE = 48, 8
 POLL = 0.1  # seconds between progress reports and looks at the keyboard
 
@@ -173,12 +173,12 @@ class _Job:
         """Take samples until all pixels have as many as `target` says; False if the time `until` came first."""
         if not self.together:
             return self._cover(target, until, (0, 0))
-        left = 1
+        left, even = 1, target.min() == target.max()
         while left > 0:
             # What is next follows from what there is, so that a render can be taken up anywhere.
             most = int((target - self.film.taken()).max(initial=0))
-            left = max(0, most - 1) // AT_ONCE * AT_ONCE
-            offset = np.random.default_rng((int(target.max()), left)).integers(0, WIDE_TILE, 2)
+            left = max(0, most - 1) // AT_ONCE * AT_ONCE if even else 0
+            offset = np.random.default_rng((int(target.sum(dtype=np.int64)), left)).integers(0, WIDE_TILE, 2)
             if not self._cover(target - left, until, (int(offset[0]), int(offset[1]))):
                 return False
         return True
@@ -188,7 +188,7 @@ class _Job:
         table = Table(np.ascontiguousarray(target, np.int32))
         while True:
             self.stop.view(np.int64)[0] = 0
-            queue = self._tiles(*offset)
+            queue = self._longest_first(list(self._tiles(*offset)), target)
             running: set[Future] = set()
             with ThreadPoolExecutor(self.threads) as pool:
                 try:
@@ -250,6 +250,14 @@ class _Job:
             taken, rays = future.result()
             self.done += taken
             self.rays += rays
+
+    def _longest_first(self, tiles: list[tuple[int, int, int, int]], target: np.ndarray) -> Iterator:
+        """Tiles by how many samples they are to take, where these are uneven: no long one shall come last."""
+        missing = target - self.film.taken()
+        if missing.min() == missing.max():
+            return iter(tiles)
+        work = [missing[y0:y1, x0:x1].sum() for x0, y0, x1, y1 in tiles]
+        return iter([tiles[k] for k in np.argsort(work, kind="stable")[::-1]])
 
     def _tiles(self, left: int, up: int) -> Iterator[tuple[int, int, int, int]]:
         side = WIDE_TILE if self.together else TILE

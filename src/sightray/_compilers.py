@@ -24,7 +24,7 @@ MOST = 4  # processes
 PATIENCE = 120.0  # seconds that a helper may take for its last kernel
 
 
-def compile_missing(kernels: list[Callable], report: Callable[[int, int, str], None] | None = None) -> None:
+def compile_missing(kernels: list[Callable], cores: int, report: Callable[[int, int, str], None] | None = None) -> None:
     """Fill the cache with the machine code of those kernels that it does not have, and load it.
 
     `report` is told how many are done, how many there are, and the name of the next.
@@ -33,7 +33,7 @@ def compile_missing(kernels: list[Callable], report: Callable[[int, int, str], N
     if not missing:
         return
     queue = deque(missing)
-    helpers = [_Helper(queue) for _ in range(_helpers_for(missing))]
+    helpers = [_Helper(queue) for _ in range(_helpers_for(missing, cores))]
     try:
         while (kernel := _next(queue, helpers)) is not None:
             if report is not None:
@@ -65,12 +65,11 @@ def _size(kernel: Callable) -> int:
     return sum(len(f.__code__.co_code) for f in _jit.reachable(kernel) if hasattr(f, "__kernel__"))
 
 
-def _helpers_for(missing: list[Callable]) -> int:
+def _helpers_for(missing: list[Callable], cores: int) -> int:
     """How many helpers to start."""
     nobody = not sys.executable or getattr(sys, "frozen", False)  # no Python to be started
     if nobody or len(missing) < FEWEST or _jit.cache_folder() is None:
         return 0
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
         wanted = int(os.environ["SIGHTRAY_COMPILERS"])
     except (KeyError, ValueError):

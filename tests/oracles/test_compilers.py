@@ -58,7 +58,7 @@ def test_a_helper_that_cannot_start_is_done_without(bench, monkeypatch):
     done, reports = bench
     monkeypatch.setattr(sys, "executable", "/bin/false" if os.path.exists("/bin/false") else sys.executable)
     kernels = [*LIBRARY, found_nowhere_else]
-    _compilers.compile_missing(kernels, lambda *told: reports.append(told))
+    _compilers.compile_missing(kernels, 2, lambda *told: reports.append(told))
     assert set(done) >= set(kernels)
     assert reports[-1] == (len(kernels), len(kernels), "")
     assert all(0 <= before <= len(kernels) for before, _, _ in reports)
@@ -66,7 +66,7 @@ def test_a_helper_that_cannot_start_is_done_without(bench, monkeypatch):
 
 def test_what_only_this_process_knows_is_compiled_here(bench):
     done, _ = bench
-    _compilers.compile_missing([*LIBRARY, found_nowhere_else])
+    _compilers.compile_missing([*LIBRARY, found_nowhere_else], 2)
     assert found_nowhere_else in done
 
 
@@ -74,7 +74,7 @@ def test_nothing_is_started_for_a_few(bench, monkeypatch):
     done, _ = bench
     monkeypatch.setattr(_compilers, "FEWEST", 20)
     monkeypatch.setattr(_compilers, "_Helper", None)
-    _compilers.compile_missing(LIBRARY)
+    _compilers.compile_missing(LIBRARY, 2)
     assert sorted(done, key=_compilers._size, reverse=True) == done
     assert set(done) == set(LIBRARY)
 
@@ -87,5 +87,5 @@ def test_a_helper_that_hangs_is_ended(bench, monkeypatch, tmp_path):
     idle.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(idle))
     monkeypatch.setattr(_compilers, "PATIENCE", 0.2)
-    _compilers.compile_missing([*LIBRARY, found_nowhere_else])
+    _compilers.compile_missing([*LIBRARY, found_nowhere_else], 2)
     assert set(done) >= {*LIBRARY, found_nowhere_else}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -22,6 +21,7 @@ from sightray.filters.table import filter_table
 from sightray.images import Image
 from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
+from sightray.scene.parallel import core_count
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
 # Where integrators want pixels together, edges of tiles cut them apart. So tiles are wide, and lie elsewhere in each pass
@@ -102,11 +102,7 @@ def _root(integrator: Any) -> Any:
 
 def thread_count(threads: int | None) -> int:
     """Threads to use: those asked for, or one for every core that this process may run on."""
-    if threads is not None:
-        return threads
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return core_count() if threads is None else threads
 
 
 class _Job:

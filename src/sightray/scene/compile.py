@@ -23,6 +23,7 @@ from sightray.scene import world as world_row
 from sightray.scene.instance import Group, Instance
 from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
+from sightray.scene.parallel import core_count
 from sightray.scene.scene import Scene
 from sightray.scene.world import light_count
 from sightray.shapes.base import Shape
@@ -98,7 +99,7 @@ class Tables:
         needed = _jit.needed_kernels(root, dict.fromkeys(type(member) for member, _ in rows))
         kernels = list(dict.fromkeys(itertools.chain([root], *(slots.values() for slots in needed.values()))))
         if compiled:
-            compile_missing(kernels, report)
+            compile_missing(kernels, core_count(), report)
         addresses = {k: _jit.address(k) if compiled else 0 for k in kernels}
         for member, row in rows:
             set_methods(row, [(slot, k, addresses[k]) for slot, k in needed[type(member)].items()])

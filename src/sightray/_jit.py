@@ -48,7 +48,7 @@ from typing import Any, NamedTuple, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-METHOD_SLOTS = 8  # words reserved for function pointers at the head of a row
+METHOD_SLOTS = 12  # words reserved for function pointers at the head of a row
 _PACKAGE = Path(__file__).parent
 _FAST_MATH = {"contract", "nsz"}  # fused multiply-add; never reassociation: results must not depend on the compiler
 _lock = threading.RLock()
@@ -87,15 +87,21 @@ def primitive(function: F) -> F:
     return function
 
 
-def method(slot: int) -> Callable[[F], F]:
-    """Declare a family's method: a call through function pointer number `slot` of the row in its first argument."""
+def method(slot: int, form_of: tuple[Callable, ...] = ()) -> Callable[[F], F]:
+    """Declare a family's method: a call through function pointer number `slot` of the row in its first argument.
+
+    With `form_of` it does the same as other methods in another form, such as for eight paths: who implements one of these
+    anew does not inherit it, but has what the family has by default.
+    """
 
     def declare(function: F) -> F:
         @functools.wraps(function)
         def call(row: Any, *arguments: Any) -> Any:
             return row.method(slot)(row, *arguments)
 
-        call.__method__ = slot  # type: ignore[attr-defined]
+        call.__method__, call.__forms__ = slot, []  # type: ignore[attr-defined]
+        for other in form_of:
+            other.__forms__.append(call)  # type: ignore[attr-defined]
         return typing.cast(F, call)
 
     return declare
@@ -108,9 +114,24 @@ def implements(declared: Callable, *classes: type) -> Callable[[F], F]:
         kernel(function)
         for cls in classes:
             cls.kernels = {**getattr(cls, "kernels", {}), declared: function}  # type: ignore[attr-defined]
+            for form in declared.__forms__:  # type: ignore[attr-defined]
+                _forget_inherited(cls, form)
         return function
 
     return attach
+
+
+def _forget_inherited(cls: Any, form: Callable) -> None:
+    """Let go of what an ancestor does for a method, and do again what the family does by default, if anything."""
+    above = [vars(base).get("kernels", {}) for base in cls.__mro__[1:]]
+    inherited = next((kernels[form] for kernels in above if form in kernels), None)
+    if inherited is None or cls.kernels[form] is not inherited:
+        return
+    root = next((base for base in cls.__mro__ if vars(base).get("family")), None)
+    default = getattr(root, "kernels", {}).get(form)
+    cls.kernels = {key: kept for key, kept in cls.kernels.items() if key is not form}
+    if default is not None:
+        cls.kernels[form] = default
 
 
 def reachable(function: Callable) -> Iterator[Callable]:

@@ -135,7 +135,7 @@ def test_caustics_have_less_noise():
 
 
 def test_who_shares_with_nobody_is_a_path_tracer():
-    scene = cornell()
+    scene = shiny_room()  # in the Cornell box eight paths go together: tests/oracles/test_eightpaths.py
     alone = sr.render(scene, sr.SharedPathTracer(share=1), samples=2)
     np.testing.assert_array_equal(alone, sr.render(scene, sr.PathTracer(), samples=2))
     spectral = sr.render(scene, sr.SharedPathTracer(spectral=True), samples=2)

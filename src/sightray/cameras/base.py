@@ -15,8 +15,10 @@ import numpy as np
 from sightray._jit import implements, kernel, method
 from sightray.errors import SceneError
 from sightray.fields import derived_integer, derived_number, derived_vector, integer, number
+from sightray.mathlib.eight_paths import load8v, put_lane
+from sightray.mathlib.eights import F64x8, Vec3x8, dot8, splat8v, sqrt8d, store8d
 from sightray.mathlib.scalars import f64
-from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
+from sightray.mathlib.table import Table, f64_at, i64_at, scratch, vec3_at
 from sightray.mathlib.vec import Vec3, normalize
 from sightray.registry import Member
 
@@ -29,6 +31,13 @@ class Ray(NamedTuple):
 
     origin: Vec3  # its 4th lane is the time, seconds
     direction: Vec3
+
+
+class Rays8(NamedTuple):
+    """Eight rays of sight, without their times."""
+
+    origin: Vec3x8
+    direction: Vec3x8
 
 
 class Camera(Member, family="cameras"):
@@ -144,6 +153,39 @@ def sight_ray(camera: Table, x: f64, y: f64, lens_u: f64, lens_v: f64, time_u: f
     return Ray(Vec3(o.x, o.y, o.z, time), ray.direction)
 
 
+@method(1, form_of=(generate_ray,))
+def generate_eight(camera: Table, x: F64x8, y: F64x8, lens_u: F64x8, lens_v: F64x8, time: F64x8) -> Rays8:
+    """`generate_ray` for eight places and moments."""
+    raise NotImplementedError
+
+
+@implements(generate_eight, Camera)
+def generate_one_by_one(camera: Table, x: F64x8, y: F64x8, lens_u: F64x8, lens_v: F64x8, time: F64x8) -> Rays8:
+    words = scratch(88)
+    store8d(words, 0, x)
+    store8d(words, 8, y)
+    store8d(words, 16, lens_u)
+    store8d(words, 24, lens_v)
+    store8d(words, 32, time)
+    for k in range(8):
+        ray = generate_ray(
+            camera, f64_at(words, k), f64_at(words, 8 + k), f64_at(words, 16 + k), f64_at(words, 24 + k),
+            f64_at(words, 32 + k),
+        )  # fmt: skip
+        put_lane(words, 40 + k, ray.origin)
+        put_lane(words, 64 + k, ray.direction)
+    return Rays8(load8v(words, 40), load8v(words, 64))
+
+
+@kernel
+def sight_rays(camera: Table, x: F64x8, y: F64x8, lens_u: F64x8, lens_v: F64x8, time_u: F64x8) -> Rays8:
+    """`sight_ray` for eight places and moments, in scenes where nothing but the camera moves."""
+    start = f64_at(camera, SHUTTER_OPEN)
+    row = y * (f64_at(camera, READOUT) / i64_at(camera, HEIGHT))
+    time = time_u * (f64_at(camera, SHUTTER_CLOSE) - start) + row + start
+    return generate_eight(camera, x, y, lens_u, lens_v, time)
+
+
 class _Pinhole(Camera):
     """Perspective cameras in any parametrisation: all rays leave the eye, directions are linear in the pixel.
 
@@ -185,6 +227,15 @@ _EYE, _CORNER, _RIGHT, _DOWN = _Pinhole.offsets()[-4:]
 def generate_pinhole_ray(camera: Table, x: f64, y: f64, lens_u: f64, lens_v: f64, time: f64) -> Ray:
     d = vec3_at(camera, _CORNER) + vec3_at(camera, _RIGHT) * x + vec3_at(camera, _DOWN) * y
     return Ray(vec3_at(camera, _EYE), normalize(d))
+
+
+@implements(generate_eight, _Pinhole)
+def generate_eight_pinhole_rays(
+    camera: Table, x: F64x8, y: F64x8, lens_u: F64x8, lens_v: F64x8, time: F64x8
+) -> Rays8:  # fmt: skip
+    right, down = splat8v(vec3_at(camera, _RIGHT)), splat8v(vec3_at(camera, _DOWN))
+    d = splat8v(vec3_at(camera, _CORNER)) + right * x + down * y
+    return Rays8(splat8v(vec3_at(camera, _EYE)), d * (1.0 / sqrt8d(dot8(d, d))))
 
 
 def coordinates(values: Any, columns: int, who: str) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from sightray import _jit
 from sightray.engine.adaptive import relative_error
+from sightray.engine.batches import render_tile_in_batches
 from sightray.engine.checkpoint import Checkpoint, State
 from sightray.engine.pixels import render_tile, render_tile_in_groups
 from sightray.engine.progress import Callback, Progress
@@ -80,7 +81,7 @@ def run(
         if progress is not None:
             progress(Progress("compile", done, total, time.perf_counter() - began, 0, name))
 
-    compiled.tables.prepare(_root(integrator), compiling)
+    compiled.tables.prepare(_root(integrator, compiled), compiling)
     film = Film(camera.width, camera.height)
     job = _Job(
         compiled, integrator, sampler, filter, film, samples, seed, limits or Limits(), threads, progress, checkpoint
@@ -95,8 +96,10 @@ def run(
     return Outcome(film, job.rays, job.seconds(), stopped)
 
 
-def _root(integrator: Any) -> Any:
+def _root(integrator: Any, compiled: Compiled) -> Any:
     """The kernel that takes samples as an integrator wants them."""
+    if integrator.by_batches and compiled.in_pieces:
+        return render_tile_in_batches
     return render_tile if integrator.together == 1 else render_tile_in_groups
 
 
@@ -120,7 +123,7 @@ class _Job:
         self.together = integrator.together > 1
         self.options = (expected, int(expected == 1), seed, *((integrator.together,) if self.together else ()))
         self.threads = thread_count(threads)
-        self.kernel = _jit.native(_root(integrator))
+        self.kernel = _jit.native(_root(integrator, compiled))
         self.target: np.ndarray | None = None
         self.rays = self.done = self.total = 0
         self.earlier = 0.0  # seconds that went into the checkpoint

@@ -21,6 +21,8 @@ import numpy as np
 
 from sightray._jit import kernel
 from sightray.filters.base import Filter
+from sightray.mathlib.eights import F64x8, floor8i, gather8d, select8i, splat8i, whole8d
+from sightray.mathlib.lanes import movemask8
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Space, Table, f64_at
 
@@ -37,6 +39,13 @@ class FilterSample(NamedTuple):
 
     offset: f64  # pixels from the pixel's centre
     weight: f64
+
+
+class FilterSample8(NamedTuple):
+    """`FilterSample` for eight samples."""
+
+    offset: F64x8
+    weight: F64x8
 
 
 def filter_table(filter: Filter, space: Space) -> Table:
@@ -71,3 +80,16 @@ def sample_filter(filter_table: Table, u: f64) -> FilterSample:
     start, end = f64_at(filter_table, CUMULATIVE + low), f64_at(filter_table, CUMULATIVE + low + 1)
     offset = f64_at(filter_table, RADIUS) * (2.0 * (low + (u - start) / (end - start)) / CELLS - 1.0)
     return FilterSample(offset, f64_at(filter_table, WEIGHTS + low))
+
+
+@kernel
+def sample_filter8(filter_table: Table, u: F64x8) -> FilterSample8:
+    """`sample_filter` for eight random numbers."""
+    low = floor8i(gather8d(filter_table, floor8i(u * CELLS) + GUIDE))
+    end = gather8d(filter_table, low + (CUMULATIVE + 1))
+    while movemask8(u >= end) != 0:
+        low = low + select8i(u >= end, splat8i(1), splat8i(0))
+        end = gather8d(filter_table, low + (CUMULATIVE + 1))
+    start = gather8d(filter_table, low + CUMULATIVE)
+    offset = f64_at(filter_table, RADIUS) * (2.0 * (whole8d(low) + (u - start) / (end - start)) / CELLS - 1.0)
+    return FilterSample8(offset, gather8d(filter_table, low + WEIGHTS))

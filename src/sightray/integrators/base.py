@@ -18,6 +18,23 @@ _ORIGIN, _DIRECTION, COLOR, _SAMPLER, _DRAWS, SO_FAR, MINE = 0, 4, 8, 12, 13, 18
 SIGHT_WORDS = 24
 
 
+# Lines of a batch, in each of which there is one word for each ray and room for eight more: the ray, the light that it is
+# found to bring, its draws, and lines of the caller's own.
+BATCH = 128  # most rays
+LINE = BATCH + 8
+ORIGIN, WAY, FOUND, KEY, PIXEL, SAMPLE, MINE_TOO = (k * LINE for k in (0, 3, 6, 9, 10, 11, 12))
+
+
+class Batch(NamedTuple):
+    """Rays that are followed together."""
+
+    lines: Table
+    size: i64  # how many
+    sampler: Table
+    samples: i64  # see `Draws`
+    dimension: i64
+
+
 class Radiance(NamedTuple):
     """What an integrator found out about a ray of sight."""
 
@@ -33,6 +50,11 @@ class Integrator(Member, family="integrators"):
         """Side of the squares of pixels whose rays are to be handed over in groups (`radiance_of_group`); 1: alone."""
         return 1
 
+    @property
+    def by_batches(self) -> bool:
+        """Whether it has `radiance_of_batch`, for scenes of few pieces."""
+        return False
+
 
 @method(0)
 def radiance(integrator: Table, world: Table, ray: Ray, draws: Draws) -> Radiance:
@@ -45,6 +67,15 @@ def radiance_of_group(integrator: Table, world: Table, sights: Table, count: i64
     """Light along the rays of neighbouring pixels, written into the `COLOR` of each; returns the number of rays shot.
 
     Only integrators that say so by `together` are asked.
+    """
+    raise NotImplementedError
+
+
+@method(2)
+def radiance_of_batch(integrator: Table, world: Table, batch: Batch) -> i64:
+    """Light along the rays of a batch, written into their `FOUND`; returns the number of rays shot.
+
+    Only integrators that say so by `by_batches` are asked, in scenes that are made of pieces (`scene.pieces`).
     """
     raise NotImplementedError
 

@@ -60,6 +60,12 @@ class PathTracer(Integrator):
         "most that a walk may add at once after its first turn, against fireflies; None for no bias", default=None, above=0,
         optional=True)  # fmt: skip
     spectral: bool = flag("follow wavelengths instead of red, green and blue", default=False)
+    @property
+    def by_batches(self) -> bool:
+        import sightray.integrators.eightpaths  # noqa: F401 - which says how
+
+        return not self.spectral
+
     _bands: Any = derived_array("table of spectra, if spectral", lambda p: band_table() if p.spectral else None)
 
 

@@ -75,6 +75,10 @@ class SharedPathTracer(PathTracer):
     )
 
     @property
+    def by_batches(self) -> bool:
+        return False
+
+    @property
     def together(self) -> int:
         return 1 if self.spectral else self.share
 

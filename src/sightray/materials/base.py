@@ -21,10 +21,12 @@ that the same kernels serve RGB and spectral paths.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from sightray._jit import implements, kernel, method
 from sightray.mathlib.bands import as_light
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import F64x8, I64x8, Vec3x8, splat8d
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, is_null, no_table
 from sightray.mathlib.vec import Vec3, grey
@@ -65,6 +67,21 @@ class BsdfValue(NamedTuple):
     density: f64  # with which `sample_bsdf` chooses wi, per solid angle
 
 
+class Sample8(NamedTuple):
+    """`BsdfSample` for eight paths."""
+
+    wi: Vec3x8
+    weight: Vec3x8
+    density: F64x8
+
+
+class Value8(NamedTuple):
+    """`BsdfValue` for eight paths."""
+
+    value: Vec3x8
+    density: F64x8
+
+
 class Way(NamedTuple):
     """What a unit of u is on the surface, and as long a way across it towards growing v."""
 
@@ -83,6 +100,8 @@ class Material(Member, family="materials"):
     nothing), `translucent` (light from behind shows: `bsdf` is not zero across the surface), `patterned` (it asks
     textures, which want to know how wide the ray is and which way the surface faces in object space).
     """
+
+    chooses: ClassVar[bool] = True  # whether `sample_eight` asks for `choice`
 
     @property
     def cutout(self) -> bool:
@@ -195,6 +214,29 @@ def glow_in_lanes(material: Table, bands: Table, rgb: Vec3) -> Vec3:
 @implements(glow_in_lanes, Material)
 def up_sampled(material: Table, bands: Table, rgb: Vec3) -> Vec3:
     return as_light(bands, rgb)
+
+
+@method(8, form_of=(sample_bsdf, bsdf))
+def sample_eight(
+    material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8
+) -> Sample8:  # fmt: skip
+    """`sample_bsdf` for eight paths at materials of one class, in RGB; textures are constant.
+
+    `rows` says how many words it is from `material` to each path's own material. Members that have this and `bsdf_eight`
+    are rendered eight paths at a time (`integrators.eightpaths`); the others need neither.
+    """
+    raise NotImplementedError
+
+
+@method(9, form_of=(bsdf,))
+def bsdf_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    """`bsdf` for eight paths."""
+    raise NotImplementedError
+
+
+@implements(bsdf_eight, Material)
+def reflect_nothing_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    return Value8(grey8(0.0), splat8d(0.0))
 
 
 @kernel

@@ -6,9 +6,11 @@ from typing import Any
 
 from sightray._jit import implements
 from sightray.fields import derived_array, derived_child, derived_vector, flag, other
-from sightray.materials.base import PHONG, Local, Material, emitted, glow_in_lanes, local
+from sightray.materials.base import PHONG, Local, Material, Sample8, emitted, glow_in_lanes, local, sample_eight
 from sightray.materials.by_wavelength import at_bands
 from sightray.mathlib.bands import as_light
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import F64x8, I64x8, Vec3x8, splat8d
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, i64_at, is_null, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey
@@ -24,6 +26,7 @@ class Emitter(Material):
     texture, such as the picture of a screen; where a `spectrum` is stated, all of it has that, and its luminance counts.
     """
 
+    chooses = False
     radiance: Any = textured("radiance that it gives off, W/(m² sr)", default=1.0, packed=False)
     two_sided: bool = flag("whether the inside of the surface glows too", default=False)
     spectrum: Any = other("illuminant's name, kelvin of a black body, or a Spectrum; None: D65", stated_light, default=None,
@@ -78,3 +81,8 @@ def local_of_emitter(material: Table, where: Where, cos_view: f64) -> Local:
     return Local(
         zero, emitted_by_emitter(material, where, cos_view), zero, zero, zero, 0.0, PHONG, zero, zero, 1.0, zero
     )
+
+
+@implements(sample_eight, Emitter)
+def sample_emitter_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
+    return Sample8(wo, grey8(0.0), splat8d(0.0))

@@ -7,11 +7,23 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, child, color, derived_child, derived_vector
-from sightray.materials.base import PHONG, BsdfSample, Local, Material, interior, local, sample_bsdf
+from sightray.materials.base import (
+    PHONG,
+    BsdfSample,
+    Local,
+    Material,
+    Sample8,
+    interior,
+    local,
+    sample_bsdf,
+    sample_eight,
+)
 from sightray.materials.body import check_body, medium_inside, stain
 from sightray.materials.by_wavelength import hero_alone
 from sightray.materials.index import disperses, index, index_at, indices_at
 from sightray.mathlib.bands import as_reflectance, hero_only
+from sightray.mathlib.eight_paths import fresnel8, gather8v, grey8, refract8
+from sightray.mathlib.eights import F64x8, I64x8, Vec3x8, abs8d, gather8d, select8d, select8v, splat8d
 from sightray.mathlib.frame import fresnel, refract
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, table_at, vec3_at
@@ -107,6 +119,15 @@ def shares_of_lanes(ior: Vec3, cosine: f64, outside: bool) -> Vec3:
     return Vec3(
         fresnel(cosine, eta.x), fresnel(cosine, eta.y), fresnel(cosine, eta.z), fresnel(cosine, eta.w)
     )  # fmt: skip
+
+
+@implements(sample_eight, Glass)
+def sample_glass_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
+    ior = gather8d(material, rows + IOR)
+    eta = select8d(wo.z > 0.0, 1.0 / ior, ior)
+    mirrored = choice < fresnel8(abs8d(wo.z), eta)
+    wi = select8v(mirrored, Vec3x8(-wo.x, -wo.y, wo.z), refract8(wo, eta))
+    return Sample8(wi, select8v(mirrored, grey8(1.0), gather8v(material, rows + TINT)), splat8d(0.0))
 
 
 @implements(interior, Glass)

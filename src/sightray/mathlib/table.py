@@ -147,6 +147,12 @@ def advance(table: Table, words: i64) -> Table:
 
 
 @primitive
+def words_to(table: Table, address: i64) -> i64:
+    """How many words it is from a table to an address."""
+    return (address - table.address) >> 3
+
+
+@primitive
 def no_table() -> Table:
     """The table that is none; only its null test is allowed."""
     return NULL

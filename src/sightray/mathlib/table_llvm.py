@@ -85,6 +85,11 @@ def advance(builder: Any, pointer: Any, words: Any) -> Any:
     return element(builder, pointer, words, I8, 8)
 
 
+@lower(table.words_to)
+def words_to(builder: Any, pointer: Any, address: Any) -> Any:
+    return builder.ashr(builder.sub(address, builder.ptrtoint(pointer, I64)), I64(3))
+
+
 @lower(table.no_table)
 def no_table(builder: Any) -> Any:
     return ir.Constant(POINTER, None)

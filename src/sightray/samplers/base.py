@@ -17,9 +17,10 @@ from __future__ import annotations
 from typing import ClassVar, NamedTuple
 
 from sightray._jit import implements, kernel, method
+from sightray.mathlib.eights import F64x8, I64x8, load8d, splat8i, store8i, stream8
 from sightray.mathlib.rng import stream
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table
+from sightray.mathlib.table import Table, f64_put, i64_at, scratch
 from sightray.registry import Member
 
 BLOCK = 16  # dimensions that a bounce may use
@@ -43,6 +44,24 @@ class Draws(NamedTuple):
     dimension: i64  # dimensions that came before
 
 
+class Pair8(NamedTuple):
+    """A pair for each of eight paths."""
+
+    u: F64x8
+    v: F64x8
+
+
+class Draws8(NamedTuple):
+    """Which random numbers come next, for eight paths that are equally far."""
+
+    sampler: Table
+    pixel: I64x8
+    key: I64x8
+    sample: I64x8
+    samples: i64
+    dimension: i64
+
+
 class Sampler(Member, family="samplers"):
     """Base of all samplers."""
 
@@ -59,6 +78,28 @@ def draw(sampler: Table, draws: Draws, dimension: i64) -> Pair:
 def begin(sampler: Table, x: i64, y: i64, seed: i64, sample: i64, samples: i64) -> Draws:
     """The draws of sample number `sample` of the pixel in column x and row y, which takes `samples`; 0: not known."""
     raise NotImplementedError
+
+
+@method(2, form_of=(draw,))
+def draw_eight(sampler: Table, draws: Draws8, dimension: i64) -> Pair8:
+    """`draw` for eight paths."""
+    raise NotImplementedError
+
+
+@implements(draw_eight, Sampler)
+def draw_one_by_one(sampler: Table, draws: Draws8, dimension: i64) -> Pair8:
+    words = scratch(40)
+    store8i(words, 0, draws.pixel)
+    store8i(words, 8, draws.key)
+    store8i(words, 16, draws.sample)
+    for k in range(8):
+        one = Draws(
+            sampler, i64_at(words, k), i64_at(words, 8 + k), i64_at(words, 16 + k), draws.samples, draws.dimension
+        )  # fmt: skip
+        found = draw(sampler, one, dimension)
+        f64_put(words, 24 + k, found.u)
+        f64_put(words, 32 + k, found.v)
+    return Pair8(load8d(words, 24), load8d(words, 32))
 
 
 @implements(begin, Sampler)
@@ -85,6 +126,29 @@ def nested(draws: Draws, level: i64) -> Draws:
     return Draws(
         draws.sampler, draws.pixel, stream(draws.key, level), draws.sample, draws.samples,
         draws.dimension + (level + 1) * BLOCK,
+    )  # fmt: skip
+
+
+@kernel
+def pair8(draws: Draws8, dimension: i64) -> Pair8:
+    """`pair` for eight paths."""
+    return draw_eight(draws.sampler, draws, draws.dimension + dimension)
+
+
+@kernel
+def nested8(draws: Draws8, level: i64) -> Draws8:
+    """`nested` for eight paths."""
+    return Draws8(
+        draws.sampler, draws.pixel, stream8(draws.key, splat8i(level)), draws.sample, draws.samples,
+        draws.dimension + (level + 1) * BLOCK,
+    )  # fmt: skip
+
+
+@kernel
+def one_of8(draws: Draws8, k: i64, count: i64) -> Draws8:
+    """`one_of` for eight paths."""
+    return Draws8(
+        draws.sampler, draws.pixel, draws.key, draws.sample * count + k, draws.samples * count, draws.dimension
     )  # fmt: skip
 
 

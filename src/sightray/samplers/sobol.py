@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from sightray._jit import implements, kernel
 from sightray.mathlib.digits import LOW, reverse_bits, scramble_reversed, shuffled, sobol_y
+from sightray.mathlib.eights import (
+    I64x8,
+    reverse8,
+    scramble_reversed8,
+    sobol_y8,
+    splat8i,
+    whole8d,
+    word8,
+)
 from sightray.mathlib.rng import word
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table
-from sightray.samplers.base import Draws, Pair, Sampler, draw
+from sightray.samplers.base import Draws, Draws8, Pair, Pair8, Sampler, draw, draw_eight
 
 UNIT = 2.0**-32
 
@@ -43,3 +52,25 @@ def scrambled_pair(index: i64, seeds: i64) -> Pair:
     v = scramble_reversed(sobol_y(index), (seeds >> 32) & LOW)
     both = reverse_bits(u | (v << 32))
     return Pair(((both >> 32) & LOW) * UNIT, (both & LOW) * UNIT)
+
+
+@implements(draw_eight, SobolSampler)
+def draw_sobol_eight(sampler: Table, draws: Draws8, dimension: i64) -> Pair8:
+    a, b = word8(draws.key, splat8i(2 * dimension)), word8(draws.key, splat8i(2 * dimension + 1))
+    return scrambled_pair8(shuffled8(draws.sample, b & LOW), a)
+
+
+@kernel
+def shuffled8(index: I64x8, seed: I64x8) -> I64x8:
+    """`shuffled` for eight indices."""
+    digits = scramble_reversed8((reverse8(index) >> 32) & LOW, seed)
+    return (reverse8(digits) >> 32) & LOW
+
+
+@kernel
+def scrambled_pair8(index: I64x8, seeds: I64x8) -> Pair8:
+    """`scrambled_pair` for eight indices."""
+    u = scramble_reversed8(index, seeds & LOW)
+    v = scramble_reversed8(sobol_y8(index), (seeds >> 32) & LOW)
+    both = reverse8(u | (v << 32))
+    return Pair8(whole8d((both >> 32) & LOW) * UNIT, whole8d(both & LOW) * UNIT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -24,6 +25,7 @@ from sightray.scene.instance import Group, Instance
 from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
 from sightray.scene.parallel import core_count
+from sightray.scene.pieces import pack_pieces, pieces_of
 from sightray.scene.scene import Scene
 from sightray.scene.world import light_count
 from sightray.shapes.base import Shape
@@ -130,7 +132,13 @@ class Compiled:
         world = space.row(world_row.WORLD_WORDS)
         lamps, own = scene.lights, set(light_indices(scene))
         pack_lamps(world, tables, lamps)
-        tables.once_reached(light_count, lambda: pack_glow(world, tables, lamps, items, self.items, own))
+
+        def pack_lights() -> None:
+            pack_glow(world, tables, lamps, items, self.items, own)
+            count = int(world.view(np.int64)[world_row.LIGHT_COUNT])
+            link(world, world_row.PIECES, pack_pieces(tables, items, self.items, count))
+
+        tables.once_reached(light_count, pack_lights)
         link(world, world_row.TREE, tree)
         link(world, world_row.ITEMS, items)
         world.view(np.int64)[world_row.MERGED] = world_row.NONE if self.merged is None else len(self.items)
@@ -145,6 +153,12 @@ class Compiled:
         numbers[world_row.BACKGROUND : world_row.BACKGROUND + 3] = scene.background
         numbers[world_row.AMBIENT : world_row.AMBIENT + 3] = scene.ambient
         return world
+
+    @functools.cached_property
+    def in_pieces(self) -> bool:
+        """Whether the scene is made of few simple surfaces, which eight rays at once can be met with."""
+        flags = [flags_of(item.material) for item in self.items]
+        return self.scene.medium is None and pieces_of(self.items, flags) is not None
 
     def _amid_bodies(self) -> bool:
         """Whether rays of sight may begin in a body that is filled."""

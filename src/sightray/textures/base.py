@@ -10,8 +10,10 @@ from sightray._jit import implements, kernel, method
 from sightray.errors import SceneError
 from sightray.fields import REQUIRED, Child, ColorField, Packer
 from sightray.mathlib.bands import as_reflectance
-from sightray.mathlib.scalars import f64
-from sightray.mathlib.table import Table, is_null, no_table
+from sightray.mathlib.eight_paths import gather8v
+from sightray.mathlib.eights import I64x8, Vec3x8, gather8i
+from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.table import Table, is_null, no_table, words_to
 from sightray.mathlib.vec import Vec3
 from sightray.registry import Member
 
@@ -78,6 +80,16 @@ def value_at(texture: Table, where: Where) -> Vec3:
     if is_null(where.bands):
         return texture_value(texture, where)
     return texture_spectrum(texture, where)
+
+
+@kernel
+def constant8(material: Table, rows: I64x8, word: i64, value: i64) -> Vec3x8:
+    """Colours of eight materials whose texture in `word` is a `Constant`, which has its colour in the word `value`.
+
+    `rows`: how many words it is from `material` to each of them.
+    """
+    first = words_to(material, 0)
+    return gather8v(material, (gather8i(material, rows + word) >> 3) + (first + value))
 
 
 @kernel

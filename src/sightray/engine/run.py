@@ -28,7 +28,11 @@ TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
 # Where integrators want pixels together, edges of tiles cut them apart. So tiles are wide, and lie elsewhere in each pass
 # and every time that all pixels have taken so many samples: no edge stays where it could be seen.
 WIDE_TILE, AT_ONCE = 48, 8
+LONG = 8  # samples of a pixel, from which on it is worth while to cut the last tiles
 POLL = 0.1  # seconds between progress reports and looks at the keyboard
+
+
+Tile = tuple[int, int, int, int]  # left, top, right and bottom
 
 
 class Limits(NamedTuple):
@@ -93,6 +97,7 @@ def run(
         stopped = "interrupted"
     finally:
         job.keep()
+        job.pool.shutdown()
     return Outcome(film, job.rays, job.seconds(), stopped)
 
 
@@ -101,6 +106,14 @@ def _root(integrator: Any, compiled: Compiled) -> Any:
     if integrator.by_batches and compiled.in_pieces:
         return render_tile_in_batches
     return render_tile if integrator.together == 1 else render_tile_in_groups
+
+
+def quarters(tile: Tile) -> list[Tile]:
+    """A tile cut in four, or less if it is that small."""
+    x0, y0, x1, y1 = tile
+    x, y = (x0 + x1) // 2, (y0 + y1) // 2
+    parts = [(x0, y0, x, y), (x, y0, x1, y), (x0, y, x, y1), (x, y, x1, y1)]
+    return [part for part in parts if part[0] < part[2] and part[1] < part[3]]
 
 
 def thread_count(threads: int | None) -> int:
@@ -123,6 +136,7 @@ class _Job:
         self.together = integrator.together > 1
         self.options = (expected, int(expected == 1), seed, *((integrator.together,) if self.together else ()))
         self.threads = thread_count(threads)
+        self.pool = ThreadPoolExecutor(self.threads)
         self.kernel = _jit.native(_root(integrator, compiled))
         self.target: np.ndarray | None = None
         self.rays = self.done = self.total = 0
@@ -187,23 +201,22 @@ class _Job:
         table = Table(np.ascontiguousarray(target, np.int32))
         while True:
             self.stop.view(np.int64)[0] = 0
-            queue = self._longest_first(list(self._tiles(*offset)), target)
+            queue = iter(self._shortest_last(list(self._tiles(*offset)), target))
             running: set[Future] = set()
-            with ThreadPoolExecutor(self.threads) as pool:
-                try:
-                    due = self._run(pool, queue, running, table, until)
-                finally:
-                    self._drain(running)
+            try:
+                due = self._run(queue, running, table, until)
+            finally:
+                self._drain(running)
             if not due:
                 return True
             if self.seconds() >= until:
                 return False
             self.keep()
 
-    def _run(self, pool: ThreadPoolExecutor, queue: Iterator, running: set[Future], table: Table, until: float) -> bool:
+    def _run(self, queue: Iterator, running: set[Future], table: Table, until: float) -> bool:
         """Keep all threads at work on tiles; True if there is something else to do before the last is finished."""
         for tile in queue:
-            running.add(pool.submit(self._tile, table, tile))
+            running.add(self.pool.submit(self._tile, table, tile))
             while len(running) >= 2 * self.threads:
                 self._wait(running, until)
                 if self._is_due(until):
@@ -250,21 +263,28 @@ class _Job:
             self.done += taken
             self.rays += rays
 
-    def _longest_first(self, tiles: list[tuple[int, int, int, int]], target: np.ndarray) -> Iterator:
-        """Tiles by how many samples they are to take, where these are uneven: no long one shall come last."""
-        missing = target - self.film.taken()
-        if missing.min() == missing.max():
-            return iter(tiles)
-        work = [missing[y0:y1, x0:x1].sum() for x0, y0, x1, y1 in tiles]
-        return iter([tiles[k] for k in np.argsort(work, kind="stable")[::-1]])
+    def _shortest_last(self, tiles: list[Tile], target: np.ndarray) -> list[Tile]:
+        """Tiles in an order in which no thread has to wait long for another at the end.
 
-    def _tiles(self, left: int, up: int) -> Iterator[tuple[int, int, int, int]]:
+        Where samples are uneven, those with most to do come first. The last ones are cut in four, unless pixels are to stay
+        together.
+        """
+        missing = target - self.film.taken()
+        if missing.min() != missing.max():
+            work = [missing[y0:y1, x0:x1].sum() for x0, y0, x1, y1 in tiles]
+            tiles = [tiles[k] for k in np.argsort(work, kind="stable")[::-1]]
+        if self.together or self.threads == 1 or missing.max() < LONG:
+            return tiles
+        last = 2 * self.threads
+        return tiles[:-last] + [part for tile in tiles[-last:] for part in quarters(tile)]
+
+    def _tiles(self, left: int, up: int) -> Iterator[Tile]:
         side = WIDE_TILE if self.together else TILE
         for y in range(-up, self.film.height, side):
             for x in range(-left, self.film.width, side):
                 yield max(x, 0), max(y, 0), min(x + side, self.film.width), min(y + side, self.film.height)
 
-    def _tile(self, table: Table, tile: tuple[int, int, int, int]) -> tuple[int, int]:
+    def _tile(self, table: Table, tile: Tile) -> tuple[int, int]:
         before = self.film.taken_in(*tile)
         rays = self.kernel(*self.rows, table, self.stop, *tile, self.film.width, *self.options)
         return self.film.taken_in(*tile) - before, rays

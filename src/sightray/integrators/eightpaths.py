@@ -91,10 +91,11 @@ from sightray.scene.pieces import (
     CHOOSES,
     FIRSTS,
     FLATS,
-    GLOWS,
+    GLOWING,
     KIND,
     KIND_COUNT,
     KINDS,
+    LIGHT_OF,
     LIGHTS,
     MATERIAL,
     NORMAL,
@@ -102,7 +103,6 @@ from sightray.scene.pieces import (
     PIECES_OF,
     ROWS,
 )
-from sightray.scene.pieces import LIGHT as LIGHT_NUMBER
 from sightray.scene.world import BACKGROUND, PIECES, SKY_COUNT, find_closest, is_blocked, light_at, light_count
 from sightray.textures.base import Where
 
@@ -215,7 +215,8 @@ def step8(
     piece, going = some_piece(met), chosen & (met >= 0)
     spot = spot8(pieces, paths.o, paths.d, paths.own, piece)
     offset, rows = piece * PIECE_WORDS, table_at(pieces, ROWS)
-    glows = movemask8((gather8i(rows, offset + GLOWS) > 0) & going)
+    kind = gather8i(rows, offset + KIND)
+    glows = movemask8((kind >= GLOWING) & going)
     if glows != 0:
         color = add_glow(integrator, world, pieces, paths, spot, piece, color, glows, event)
     if event >= i64_at(integrator, DEPTH) or movemask8(going) == 0:
@@ -230,12 +231,14 @@ def step8(
     frame = frame_about8(spot.normal)
     wo = into8(frame, -paths.d)
     size = vmax8d(vmax8d(abs8d(spot.p.x), abs8d(spot.p.y)), abs8d(spot.p.z))
-    kind, material = gather8i(rows, offset + KIND), gather8i(rows, offset + MATERIAL)
-    here = Surface8(spot, piece, kind, material, vmax8d(spot.t, size) * 1e-9, frame, wo)
+    t_min, material = vmax8d(spot.t, size) * 1e-9, gather8i(rows, offset + MATERIAL)
+    here = Surface8(spot, piece, kind & (GLOWING - 1), material, t_min, frame, wo)
     next = sample_of_kinds(pieces, here, way, choice.u)
     d, beta = out_of8(frame, next.wi), paths.beta * next.weight
     odds = survival8(integrator, beta, event + 1)
     on = going & (choice.v < odds)
+    if event >= i64_at(integrator, ROULETTE_DEPTH):
+        beta = beta * (1.0 / odds)
 
     # Look for lights.
     count = i64_at(integrator, LIGHT_SAMPLES) if event == 0 else 1
@@ -252,10 +255,10 @@ def step8(
     write_found(batch.lines, paths.place, color, movemask8(chosen & not8(on)))
     keep_lines(lines, START + left, spot.p, on)
     keep_lines(lines, GOES + left, d, on)
-    keep_lines(lines, BETA + left, beta * (1.0 / odds), on)
+    keep_lines(lines, BETA + left, beta, on)
     keep_lines(lines, COLOR + left, color, on)
     store_chosen8d(lines, DENSITY + left, next.density, on)
-    store_chosen8d(lines, BEGIN + left, here.t_min, on)
+    store_chosen8d(lines, BEGIN + left, t_min, on)
     store_chosen8i(lines, ITS_KEY + left, paths.draws.key, on)
     store_chosen8i(lines, ITS_PIXEL + left, paths.draws.pixel, on)
     store_chosen8i(lines, ITS_SAMPLE + left, paths.draws.sample, on)
@@ -313,17 +316,16 @@ def light8(world: Table, pieces: Table, here: Surface8, own: Draws8, going: Mask
     place = pair8(own, PLACE)
     if light_count(world) == 1:
         sample = illuminate_eight(light_at(world, 0), here.spot.p, place.u, place.v)
-        probability = splat8d(1.0)
         target = splat8i(i64_at(table_at(pieces, LIGHTS), 0))
     else:
         words = scratch(112)
         illuminate_by_chosen(world, here, pair8(own, LIGHT).u, place, words)
         sample = LightSample8(load8v(words, 0), load8d(words, 48), load8v(words, 24), load8d(words, 56))
-        probability, target = load8d(words, 64), load8i(words, 72)
+        target = load8i(words, 64)
     answer = bsdf_of_kinds(pieces, here, into8(here.frame, sample.direction))
-    q = sample.density * probability
+    q = sample.density
     weight = select8d(q > 0.0, q * q / (q * q + answer.density * answer.density), splat8d(1.0))
-    light = answer.value * sample.irradiance * (weight / probability)
+    light = answer.value * sample.irradiance * weight
     return Lit8(light, sample.direction, sample.distance - here.t_min, target, going & (brightest8(light) > 0.0))
 
 
@@ -407,7 +409,10 @@ def with_skies(integrator: Table, world: Table, paths: Paths8, color: Vec3x8, mi
 
 @kernel
 def illuminate_by_chosen(world: Table, here: Surface8, which: F64x8, place: Pair8, words: Table) -> None:
-    """One light for each surface and a point of it: direction, irradiance, distance, density, probability, piece."""
+    """One light for each surface and a point of it: direction, irradiance, distance, density and piece.
+
+    Irradiance is divided by the probability of the choice, densities are multiplied by it.
+    """
     mine, lights = scratch(88), table_at(table_at(world, PIECES), LIGHTS)
     store8v(mine, 0, here.spot.p)
     normal = here.spot.normal
@@ -418,16 +423,15 @@ def illuminate_by_chosen(world: Table, here: Surface8, which: F64x8, place: Pair
     for k in range(8):
         p = lane_at(mine, k)
         choice = choose_light(world, p, lane_at(mine, 24 + k), f64_at(mine, 48 + k))
-        f64_put(words, 64 + k, max(choice.probability, 1e-300))
         put_lane(words, 24 + k, grey(0.0))
         if choice.light < 0:
             continue
         found = illuminate(light_at(world, choice.light), p, WHOLE, f64_at(mine, 56 + k), f64_at(mine, 64 + k))
         put_lane(words, k, found.direction)
-        put_lane(words, 24 + k, found.irradiance)
+        put_lane(words, 24 + k, found.irradiance * (1.0 / choice.probability))
         f64_put(words, 48 + k, found.distance)
-        f64_put(words, 56 + k, found.density)
-        i64_put(words, 72 + k, i64_at(lights, choice.light))
+        f64_put(words, 56 + k, found.density * choice.probability)
+        i64_put(words, 64 + k, i64_at(lights, choice.light))
 
 
 @kernel
@@ -477,7 +481,7 @@ def add_skies(integrator: Table, world: Table, paths: Paths8, color: Vec3x8, bit
 
 @kernel
 def add_glow(
-    integrator: Table, world: Table, pieces: Table, paths: Paths8, spot: Spot8, piece: I64x8, color: Vec3x8, bits: i64,
+    integrator: Table, world: Table, pieces: Table, paths: Paths8, spot: Spot8, at: I64x8, color: Vec3x8, bits: i64,
     event: i64,
 ) -> Vec3x8:  # fmt: skip
     """What the surfaces in `bits` give off, weighed as `path.given_off` does."""
@@ -486,17 +490,19 @@ def add_glow(
     store8v(words, 80, color)
     store8d(words, 128, spot.t)
     store8d(words, 136, -dot8(spot.normal, paths.d))
-    store8i(words, 144, piece)
+    store8i(words, 144, at)
     while bits != 0:
         k = lowest_bit(bits)
         bits &= bits - 1
-        row = advance(table_at(pieces, ROWS), i64_at(words, 144 + k) * PIECE_WORDS)
+        piece = i64_at(words, 144 + k)
+        row = advance(table_at(pieces, ROWS), piece * PIECE_WORDS)
         zero = grey(0.0)
         where = Where(0.0, 0.0, zero, zero, 0.0, no_table())
         glow = emitted(table_at(row, MATERIAL), where, f64_at(words, 136 + k))
+        number = i64_at(table_at(pieces, LIGHT_OF), piece)
         weight = chance_weight(
-            world, i64_at(row, LIGHT_NUMBER), lane_at(words, k), lane_at(words, 56 + k), lane_at(words, 24 + k),
-            f64_at(words, 128 + k), f64_at(words, 48 + k),
+            world, number, lane_at(words, k), lane_at(words, 56 + k), lane_at(words, 24 + k), f64_at(words, 128 + k),
+            f64_at(words, 48 + k),
         )  # fmt: skip
         light = lane_at(words, 104 + k) * glow * weight
         put_lane(words, 80 + k, lane_at(words, 80 + k) + limited(integrator, light, event))

@@ -14,6 +14,7 @@ on threads, tiles or order, and an interrupted one goes on where it was.
 
 from __future__ import annotations
 
+import functools
 from typing import ClassVar, NamedTuple
 
 from sightray._jit import implements, kernel, method
@@ -160,8 +161,9 @@ def one_of(draws: Draws, k: i64, count: i64) -> Draws:
     )  # fmt: skip
 
 
+@functools.cache
 def default_sampler() -> Sampler:
-    """The sampler of pictures for which none is chosen."""
+    """The sampler of pictures for which none is chosen; always the same, so that a scene packs it once."""
     from sightray.samplers.sobol import SobolSampler
 
     return SobolSampler()

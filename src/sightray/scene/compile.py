@@ -25,7 +25,7 @@ from sightray.scene.instance import Group, Instance
 from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
 from sightray.scene.parallel import core_count
-from sightray.scene.pieces import pack_pieces, pieces_of
+from sightray.scene.pieces import MOST, pack_pieces, pieces_of
 from sightray.scene.scene import Scene
 from sightray.scene.world import light_count
 from sightray.shapes.base import Shape
@@ -157,8 +157,9 @@ class Compiled:
     @functools.cached_property
     def in_pieces(self) -> bool:
         """Whether the scene is made of few simple surfaces, which eight rays at once can be met with."""
-        flags = [flags_of(item.material) for item in self.items]
-        return self.scene.medium is None and pieces_of(self.items, flags) is not None
+        if len(self.items) > MOST or self.scene.medium is not None:
+            return False
+        return pieces_of(self.items, [flags_of(item.material) for item in self.items]) is not None
 
     def _amid_bodies(self) -> bool:
         """Whether rays of sight may begin in a body that is filled."""

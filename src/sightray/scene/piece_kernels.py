@@ -45,7 +45,6 @@ from sightray.scene.pieces import (
     F_U,
     F_V,
     FLATS,
-    FLOATS,
     MOST,
     NORMAL,
     OFFSET,
@@ -141,7 +140,7 @@ def way8(d: Vec3x8) -> Way8:
 @kernel
 def number8(row: Table, index: i64) -> F32x8:
     """One of a piece's floats, for all rays."""
-    return splat8(float(f32_at(row, FLOATS + index)))
+    return splat8(float(f32_at(row, index)))
 
 
 @kernel

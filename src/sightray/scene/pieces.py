@@ -22,17 +22,18 @@ from sightray.shapes.triangle import Triangle
 
 MOST = 48  # pieces; with more, trees win
 
-# Words of the head.
-FLATS, BALLS, ROWS, FIRSTS, PIECES_OF, LIGHTS, KINDS, KIND_COUNT, REACH, CHOOSES, CENTER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12
+# Words of the head: how many there are, then pointers: the pieces; the first of each item's primitives, and the pieces of
+# these; the pieces of lights, and the lights of pieces; a material's row of each class of materials.
+FLATS, BALLS, ROWS, FIRSTS, PIECES_OF, LIGHTS, LIGHT_OF, KINDS, KIND_COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8
+REACH, CHOOSES, CENTER = 9, 10, 12  # largest coordinate about the centre; whether a material asks for `choice`
 HEAD_WORDS = 16
-# Words of a piece. Flat: unit normal n and n a, then U and V, which give u and v of a point p as U p + u0, V p + v0. Ball:
-# centre and radius.
-NORMAL, OFFSET, ROW_U, ROW_V = 0, 3, 4, 8
-MATERIAL, KIND, ITEM, PRIM, LIGHT, GLOWS = 12, 13, 14, 15, 16, 17
-# The same as floats, about the centre of all: n, -n a, U, u0, V, v0, the functions of the other edges, and slacks.
-FLOATS = 36  # counted in floats
+# A piece, two cache lines. As floats, about the centre of all: n, -n a; U, u0 and V, v0, which give u and v of a point p as
+# U p + u0, V p + v0; the functions of the other edges; slack of places.
 F_NORMAL, F_U, F_V, F_THIRD, F_FOURTH, F_SIDE = 0, 4, 8, 12, 15, 18
-PIECE_WORDS = 32
+# As doubles: unit normal n and n a, or a ball's centre and radius; then the material's row, and the number of its class.
+NORMAL, OFFSET, MATERIAL, KIND = 10, 13, 14, 15
+GLOWING = 1 << 16  # is added to the number of what glows
+PIECE_WORDS = 16
 SIDE = 384 * 2.0**-24  # slack of places on a piece, see bvh/few.py
 
 LEFT_OUT = item_row.CUTOUT | item_row.BUMPY | item_row.ORIENTED | item_row.CLEAR | item_row.PATTERNED
@@ -68,6 +69,8 @@ def pieces_of(items: Sequence[Any], flags: Sequence[int]) -> tuple[list[Flat], l
             return None
         if len(flats) + len(balls) > MOST:
             return None
+    if not all(_has_area(flat.corners) for flat in flats):
+        return None
     return (flats, balls) if flats or balls else None
 
 
@@ -92,6 +95,12 @@ def _quadrilateral(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
     return None
 
 
+def _has_area(corners: np.ndarray) -> bool:
+    """Whether a piece is wide enough for its coordinates to be told."""
+    e_u, e_v = corners[1] - corners[0], corners[-1] - corners[0]
+    return bool(np.linalg.norm(np.cross(e_u, e_v)) > 1e-6 * max(e_u @ e_u, e_v @ e_v))
+
+
 def _is_flat_and_convex(corners: np.ndarray) -> bool:
     edges = np.roll(corners, -1, axis=0) - corners
     turns = np.cross(edges, np.roll(edges, -1, axis=0))
@@ -103,6 +112,8 @@ def _is_flat_and_convex(corners: np.ndarray) -> bool:
 
 def pack_pieces(tables: Any, items: Table, things: Sequence[Any], light_count: int) -> Table | None:
     """The head of a scene's pieces, or None if it is not made of such."""
+    if len(things) > MOST:
+        return None
     words = items.view(np.int64).reshape(-1, item_row.ITEM_WORDS)[: len(things)]
     found = pieces_of(things, words[:, item_row.FLAGS].tolist())
     if found is None:
@@ -121,23 +132,24 @@ def pack_pieces(tables: Any, items: Table, things: Sequence[Any], light_count: i
     kinds: dict[type[Material], int] = {}  # row of a material of each class
     origins = [*((flat.item, flat.prims) for flat in flats), *((index, (0,)) for index in balls)]
     firsts = np.cumsum([0, *(len(thing.shape.faces) if isinstance(thing.shape, Mesh) else 1 for thing in things)])
-    numbers, lights, integers = np.zeros(firsts[-1], np.int64), np.full(light_count, -1, np.int64), rows.view(np.int64)
+    numbers, lights, light_of = np.zeros(firsts[-1], np.int64), np.full(light_count, -1), np.full(len(rows), -1)
+    integers = rows.view(np.int64)
     for piece, (index, prims) in enumerate(origins):
         material = things[index].material
         row = integers[piece]
         row[MATERIAL] = tables.row_of(material).address
         row[KIND] = list(kinds).index(type(material)) if type(material) in kinds else len(kinds)
         kinds.setdefault(type(material), int(row[MATERIAL]))
-        row[ITEM], row[PRIM], row[GLOWS] = index, prims[0], material.glow > 0.0
-        row[LIGHT] = words[index, item_row.LIGHT] + words[index, item_row.LIGHT_STEP] * prims[0]
-        if row[LIGHT] >= 0:
-            lights[row[LIGHT]] = piece
+        row[KIND] += GLOWING * (material.glow > 0.0)
+        light_of[piece] = words[index, item_row.LIGHT] + words[index, item_row.LIGHT_STEP] * prims[0]
+        if light_of[piece] >= 0:
+            lights[light_of[piece]] = piece
         numbers[[firsts[index] + prim for prim in prims]] = piece
     head = tables.space.row(HEAD_WORDS)
     counts = head.view(np.int64)
     counts[FLATS], counts[BALLS], counts[KIND_COUNT] = len(flats), len(balls), len(kinds)
     counts[CHOOSES] = any(kind.chooses for kind in kinds)
-    for word, values in ((ROWS, rows), (FIRSTS, firsts), (PIECES_OF, numbers), (LIGHTS, lights),
+    for word, values in ((ROWS, rows), (FIRSTS, firsts), (PIECES_OF, numbers), (LIGHTS, lights), (LIGHT_OF, light_of),
                          (KINDS, np.array(list(kinds.values())))):  # fmt: skip
         link(head, word, tables.space.array(np.ascontiguousarray(values)))
     head.view(np.float64)[CENTER : CENTER + 3], head.view(np.float64)[REACH] = center, np.abs(points - center).max()
@@ -157,10 +169,7 @@ def _pack_flat(row: np.ndarray, corners: np.ndarray, center: np.ndarray) -> None
         alpha, beta = c @ first, c @ second
         third, fourth = np.array([beta, -beta, alpha - 1.0]), np.array([alpha, beta - 1.0, -alpha])
     row[NORMAL : NORMAL + 3], row[OFFSET] = n, n @ a
-    row[ROW_U : ROW_U + 3], row[ROW_U + 3] = first, -first @ a
-    row[ROW_V : ROW_V + 3], row[ROW_V + 3] = second, -second @ a
-    floats = row.view(np.float32)[FLOATS:]
-    a = a - center
+    floats, a = row.view(np.float32), a - center
     for at, part in ((F_NORMAL, (*n, -n @ a)), (F_U, (*first, -first @ a)), (F_V, (*second, -second @ a)),
                      (F_THIRD, third), (F_FOURTH, fourth)):  # fmt: skip
         floats[at : at + len(part)] = part

@@ -89,12 +89,18 @@ def open_under_sky():
     )  # fmt: skip
 
 
+def wide_lamp():
+    """A lamp that is near everywhere: it is cut by solid angles."""
+    return room(sr.RectangleLight(corner=at(-1.8, 2.9, -1.8), edge_u=at(3.6, 0, 0), edge_v=at(0, 0, 3.6), radiance=2))
+
+
 def without_lights():
     floor = box((-3, -1, -3), (3, 0, 3), sr.Lambert(albedo=0.6))
     return sr.Scene(floor, sr.Sphere(center=at(0, 0.6, 0), radius=0.5), camera=camera(), background=(1, 0.5, 0.2))
 
 
-SCENES = {"lit room": lit_room, "lamps": room_of_lamps, "sky": open_under_sky, "no lights": without_lights}
+SCENES = {"lit room": lit_room, "lamps": room_of_lamps, "wide lamp": wide_lamp, "sky": open_under_sky,
+          "no lights": without_lights}  # fmt: skip
 
 
 def one_at_a_time(scene, tracer, **options):

@@ -11,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import operator
 import types
-import typing
 from collections.abc import Callable
 from typing import Any
 
@@ -278,15 +277,13 @@ def word8(key: I64x8, dimension: I64x8) -> I64x8:
     return I64x8([rng.word(int(k), int(n)) for k, n in zip(key.values, dimension.values, strict=True)])
 
 
-def eightfold(function: Callable, **callees: Callable) -> Any:
-    """The kernel `function`, which has no branches, for eight lanes of each number; `callees` replace what it calls."""
-    lanes = {float: F64x8, int: I64x8, bool: Mask8, Vec3: Vec3x8}
-    scope = {**function.__globals__, **callees}  # type: ignore[attr-defined]
+def eightfold(function: Callable) -> Any:
+    """The kernel `function`, which has no branches and calls no other, for eight lanes of each number."""
+    lanes = {"f64": F64x8, "i64": I64x8}
     name = f"{function.__name__}8"
-    found = types.FunctionType(function.__code__, scope, name)  # type: ignore[attr-defined]
+    found = types.FunctionType(function.__code__, function.__globals__, name)  # type: ignore[attr-defined]
     found.__module__, found.__qualname__, found.__doc__ = __name__, name, function.__doc__
-    hints = typing.get_type_hints(function)
-    found.__annotations__ = {key: lanes.get(hint, hint) for key, hint in hints.items()}
+    found.__annotations__ = {key: lanes[hint] for key, hint in function.__annotations__.items()}
     found.__kernel__ = function.__kernel__  # type: ignore[attr-defined]
     return found
 

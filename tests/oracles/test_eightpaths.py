@@ -9,6 +9,7 @@ import pytest
 
 import sightray as sr
 from sightray._jit import implements, kernel, native
+from sightray.accelerators.grid import Grid
 from sightray.cameras.base import generate_eight
 from sightray.engine.batches import render_tile_in_batches
 from sightray.integrators.eightpaths import some_piece
@@ -203,6 +204,7 @@ def test_other_shapes_places_and_media_are_left_to_single_paths():
     assert not made_of_pieces(sr.Mesh(vertices=corners, faces=[(0, 1, 2)], normals=corners))
     assert not made_of_pieces(*[sr.Sphere(center=(3 * k, 0, 0)) for k in range(MOST + 1)])
     assert not made_of_pieces(ball, medium=sr.HomogeneousMedium(absorption=1))
+    assert not compile_scene(sr.Scene(ball, camera=camera()), Grid()).in_pieces  # who asks for a grid gets it
     assert not made_of_pieces(sr.PointLight(position=(0, 1, 0)))
 
 

@@ -127,6 +127,28 @@ def test_packets_that_form_groups(width, together):
         assert 0.1 < np.isfinite(found[..., 0]).mean() < 1.0
 
 
+def slivers(rng, n):
+    """Long and thin triangles in all directions, whose boxes overlap."""
+    start, along, aside = rng.uniform(-1, 1, (n, 3)), *rng.normal(size=(2, n, 3))
+    vertices = np.stack([start, start + along, start + 1e-2 * aside], axis=1).reshape(-1, 3)
+    return vertices, np.arange(3 * n).reshape(-1, 3)
+
+
+def test_rays_from_one_place_in_all_directions():
+    """They begin together; among slivers they meet more boxes on their own than their stacks keep for later."""
+    rng = np.random.default_rng(7)
+    for vertices, faces in (ball(), slivers(rng, 6000)):
+        _space, row = packed(vertices, faces)
+        o = rng.uniform(-1, 1, (400, 1, 3)) * (1 + 1e-6 * rng.normal(size=(400, 16, 1)))
+        d = rng.normal(size=(400, 16, 3)) * rng.uniform(0.1, 10, (400, 1, 1))
+        d[:200] = d[:200, :1] + 0.3 * d[:200]  # about the same way, but not quite
+        d[::7, ::3, 1] = 0.0
+        for end in (math.inf, np.where(rng.random((400, 16)) < 0.2, math.nan, rng.uniform(0.0, 3.0, (400, 16)))):
+            found, coherent = compare(row, o, d, end, t_min=0.01)
+            assert coherent < 0.05
+            assert 0.1 < np.isfinite(found[..., 0]).mean() < 0.99
+
+
 def test_bundles_from_one_eye_through_edges_and_vertices():
     rng = np.random.default_rng(3)
     vertices, faces = ball(subdivisions=3)

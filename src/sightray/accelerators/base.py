@@ -19,6 +19,7 @@ class Accelerator(Member, family="accelerators"):
     """Base of all accelerators over the items of a scene."""
 
     merges_meshes: ClassVar[bool] = False  # whether small meshes are put together for it (see `scene.merge`)
+    steps_aside: ClassVar[bool] = False  # whether paths may do without it where all pieces are met (see `scene.pieces`)
 
     def build(self, space: Space, items: Table, lower: np.ndarray, upper: np.ndarray) -> Any:
         """Row of the structure over items with these world bounds, each (n, 3) float64.

@@ -12,8 +12,8 @@ import numpy as np
 
 from sightray._jit import implements, kernel
 from sightray.accelerators.base import Accelerator, blocked, closest
-from sightray.accelerators.item import ItemHit, better, intersect_item, item_at, occluded_item, worth
-from sightray.bvh.binned_sah import build, pack_tree
+from sightray.accelerators.item import ITEM_WORDS, MET, ItemHit, better, intersect_item, item_at, occluded_item, worth
+from sightray.bvh.binned_sah import Bvh8, build, pack_tree
 from sightray.bvh.bvh8 import (
     BOTTOM,
     CHILD,
@@ -30,7 +30,7 @@ from sightray.bvh.bvh8 import (
 from sightray.mathlib.hit import is_hit
 from sightray.mathlib.lanes import sort_key
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Space, Table, i64_at, i64_put, link, scratch, table_at
+from sightray.mathlib.table import Space, Table, aligned, i64_at, i64_put, link, scratch, table_at
 from sightray.mathlib.tally import TESTS, tally
 from sightray.mathlib.vec import Vec3
 
@@ -39,7 +39,11 @@ ORDER = TREE_WORDS  # pointer to item numbers as 32-bit integers: leaves are ran
 ITEMS = TREE_WORDS + 1  # pointer to the items' rows
 UNBOUNDED = TREE_WORDS + 2  # pointer to the numbers of the items outside the tree
 UNBOUNDED_COUNT, BOUNDED_COUNT = TREE_WORDS + 3, TREE_WORDS + 4
-ITEM_TREE_WORDS = TREE_WORDS + 5
+LEAVES = TREE_WORDS + 5  # pointer to rows of `LEAF_FLOATS`, an item each, in the tree's order
+ITEM_TREE_WORDS = TREE_WORDS + 6
+# A leaf's row is a cache line: the item's box in the unit frame, lower corner and upper; the item's number as an integer;
+# and the pointer to what rays meet, as in the item's row.
+LEAF_FLOATS, LEAF_ITEM, LEAF_MET = 16, 6, 4
 FEW = 3  # items for which no tree is walked
 
 
@@ -51,6 +55,7 @@ class Bvh(Accelerator):
     """
 
     merges_meshes = True
+    steps_aside = True
 
     def build(self, space: Space, items: Table, lower: np.ndarray, upper: np.ndarray) -> Table:
         return pack_items(space, items, lower, upper)
@@ -69,10 +74,21 @@ def pack_items(space: Space, items: Table, lower: np.ndarray, upper: np.ndarray)
     row = space.row(ITEM_TREE_WORDS)
     pack_tree(space, row, tree)
     link(row, ORDER, space.array(bounded[tree.order]))
+    link(row, LEAVES, space.array(leaves_of(tree, lower[bounded] - error, upper[bounded] + error, items, bounded)))
     link(row, ITEMS, items)
     link(row, UNBOUNDED, space.array(unbounded))
     row.view(np.int64)[[UNBOUNDED_COUNT, BOUNDED_COUNT]] = len(unbounded), len(bounded)
     return row
+
+
+def leaves_of(tree: Bvh8, lower: np.ndarray, upper: np.ndarray, items: Table, bounded: np.ndarray) -> np.ndarray:
+    """The rows that `LEAVES` names, of a tree over the boxes of the items with the numbers `bounded`."""
+    leaves, number = aligned((len(bounded), LEAF_FLOATS), np.float32), bounded[tree.order]
+    leaves[:, 0:3] = ((lower - tree.center) * tree.scale)[tree.order]
+    leaves[:, 3:6] = ((upper - tree.center) * tree.scale)[tree.order]
+    leaves.view(np.int32)[:, LEAF_ITEM] = number
+    leaves.view(np.int64)[:, LEAF_MET] = items.view(np.int64)[number.astype(np.int64) * ITEM_WORDS + MET]
+    return leaves
 
 
 @implements(closest, Bvh)

@@ -28,6 +28,7 @@ LIGHT_STEP = 6  # from the light that a primitive is to that of the next: 1 wher
 CUTOUT, BUMPY, ORIENTED, CLEAR, THIN, TRANSLUCENT, PATTERNED = 1, 2, 4, 8, 16, 32, 64
 OBJECT_FROM_WORLD, WORLD_FROM_OBJECT = 8, 24
 ITEM_WORDS = 40
+TINY = 2.0**-1000  # metres; what is added to numbers that may be zero
 
 
 class ItemHit(NamedTuple):
@@ -51,7 +52,13 @@ def better(hit: ItemHit, best: ItemHit) -> bool:
 @kernel
 def worth(best: ItemHit, t_max: f64) -> f64:
     """Up to where a better hit may lie: just behind the best one so far, so that one at the same place is seen."""
-    return min(t_max, best.t * (1.0 + 2.0**-52))
+    return min(t_max, just_behind(best.t))
+
+
+@kernel
+def just_behind(t: f64) -> f64:
+    """A number that is larger than t, by hardly anything."""
+    return t + (abs(t) * 2.0**-52 + TINY)
 
 
 @kernel

@@ -20,10 +20,9 @@ from sightray.bvh.bvh8 import (
     BOTTOM,
     CHILD,
     LEAF,
-    NODE_FLOATS,
     NODES,
-    STACK_WORDS,
     BoxRay,
+    float_at,
     int_at,
     pop_near,
     push_children_unsorted,
@@ -51,12 +50,22 @@ from sightray.bvh.casting import (
     R,
     cast_alone,
 )
+from sightray.bvh.shared import (
+    ALL_PAIRS,
+    OWN,
+    STRIDE,
+    Crowd,
+    Halt,
+    any_shared,
+    begin,
+    closest_shared,
+    many,
+    prefetch_child,
+    prefetch_corners,
+)
 from sightray.bvh.triangles import (
     BLOCK_FLOATS,
     BLOCKS,
-    INDICES,
-    NUMBERS,
-    VERTICES,
     TriangleRay,
     filter_block,
     meet_triangle,
@@ -64,15 +73,12 @@ from sightray.bvh.triangles import (
 )
 from sightray.mathlib.lanes import (
     lowest_bit,
-    prefetch,
     splat4,
     splat8,
 )
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, advance, f32_at, f32_put, f64_at, f64_put, i64_at, i64_put, table_at
+from sightray.mathlib.table import Table, advance, f32_put, f64_at, f64_put, i64_at, i64_put, scratch, table_at
 from sightray.mathlib.vec import Vec3
-
-STRIDE = STACK_WORDS + 8  # words from stack to stack; one line more, lest all begin in the same set of the cache
 
 # Words of the room that the rays of a bundle take: what each visits next, its stack's height, what waits, and its stack.
 NEXT, TOPS, WAITING, STACKS = 0, 64, 128, 192
@@ -114,40 +120,9 @@ def work_of(k: i64) -> i64:
 
 
 @kernel
-def float_at(table: Table, index: i64) -> f64:
-    """Float number `index` of a table as a double."""
-    return float(f32_at(table, index))
-
-
-@kernel
 def packet_vec3(packet: Table, at: i64) -> Vec3:
     """Origin or direction of one ray of a packet."""
     return Vec3(f64_at(packet, at), f64_at(packet, at + 16), f64_at(packet, at + 32))
-
-
-@kernel
-def prefetch_child(nodes: Table, blocks: Table, child: i64) -> None:
-    """Ask for the cache lines that a child will read: four of a node, three of a block."""
-    table = nodes if child < LEAF else blocks
-    at = child * NODE_FLOATS if child < LEAF else (child & (LEAF - 1)) * BLOCK_FLOATS
-    prefetch(table, at)
-    prefetch(table, at + 16)
-    prefetch(table, at + 32)
-    prefetch(table, at + (48 if child < LEAF else 32))
-
-
-@kernel
-def prefetch_corners(mesh: Table, block: i64, maybe: i64) -> None:
-    """Ask for the corners of triangles of a block, two lines each, and for their numbers."""
-    vertices, blocks = table_at(mesh, VERTICES), table_at(mesh, BLOCKS)
-    prefetch(table_at(mesh, NUMBERS), 4 * block)
-    while maybe != 0:
-        at = block * BLOCK_FLOATS + INDICES + lowest_bit(maybe)
-        maybe &= maybe - 1
-        for corner in range(3):
-            vertex = 6 * int_at(blocks, at + 4 * corner)
-            prefetch(vertices, vertex)
-            prefetch(vertices, vertex + 4)
 
 
 class Bundle(NamedTuple):
@@ -165,8 +140,9 @@ def board(alive: i64, works: Table, all_lanes: Table, room: Table) -> None:
             cast_alone(advance(works, p * WORK_WORDS), advance(all_lanes, p * LANE_WORDS))
     for k in range(64):
         i64_put(room, NEXT + k, 0)
-        i64_put(room, TOPS + k, 1)
-        i64_put(room, STACKS + k * STRIDE, BOTTOM)
+        i64_put(room, TOPS + k, OWN)
+    for k in range(64):
+        i64_put(room, STACKS + k * STRIDE + OWN - 1, BOTTOM)
 
 
 @kernel
@@ -182,13 +158,56 @@ def proceed(mesh: Table, room: Table, now: Bundle, k: i64, key: i64, top: i64) -
 
 
 @kernel
+def part(mesh: Table, rays: i64, sorted: bool, all_lanes: Table, room: Table) -> Bundle:
+    """What rays that were on their way together visit first when each goes its own way; maybe what is nearest."""
+    now = Bundle(0, 0)
+    while rays != 0:
+        k = lowest_bit(rays)
+        rays &= rays - 1
+        lowest, stack = i64_at(room, TOPS + k), advance(room, STACKS + k * STRIDE)
+        if lowest < OWN:
+            i64_put(stack, lowest - 1, BOTTOM)
+            if sorted:
+                nearest_on_top(stack, lowest)
+            next = pop_near(stack, OWN, float_at(advance(all_lanes, (k >> 4) * LANE_WORDS), END_AT + (k & 15)))
+            now = proceed(mesh, room, now, k, next.key, next.top)
+    return now
+
+
+@kernel
+def nearest_on_top(stack: Table, lowest: i64) -> None:
+    """Bring the smallest key from `lowest` on to the top."""
+    key = i64_at(stack, lowest)
+    for place in range(lowest + 1, OWN):
+        other = i64_at(stack, place)
+        i64_put(stack, place - 1, max(key, other))
+        key = min(key, other)
+    i64_put(stack, OWN - 1, key)
+
+
+@kernel
 def closest_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
-    """`closest_rays` for the rays `alive`, each on its own."""
+    """`closest_rays` for the rays `alive`, together where many meet the same, and then each on its own."""
     board(alive, works, all_lanes, room)
-    nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
-    now, found, due = Bundle(alive, 0), 0, 0
+    together = many(mesh, alive, all_lanes)
+    crowd = Crowd(scratch(ALL_PAIRS), scratch(24), advance(room, STACKS), advance(room, TOPS))
+    halt = Halt(begin(packets, works, together, crowd), 0)
+    found = closest_apart(mesh, packets, t_min, Bundle(alive & ~together, 0), 0, works, all_lanes, room)
+    while halt.going != 0:
+        halt = closest_shared(mesh, packets, t_min, works, all_lanes, crowd, Halt(halt.going, found))
+        now = part(mesh, together, True, all_lanes, room)
+        found = closest_apart(mesh, packets, t_min, now, halt.met, works, all_lanes, room)
+    return found
+
+
+@kernel
+def closest_apart(
+    mesh: Table, packets: Table, t_min: f64, now: Bundle, found: i64, works: Table, all_lanes: Table, room: Table
+) -> i64:
+    """Nearest hits of the rays of a bundle, each on its own; `found`, who has met anything, with those that do now."""
+    nodes, blocks, due = table_at(mesh, NODES), table_at(mesh, BLOCKS), 0
     while now.nodes | now.leaves | due != 0:
         # First all rays that visit a node, then those that visit a leaf: so the processor knows which comes next.
         turn, leaves, deciding = now.nodes, now.leaves, due
@@ -253,10 +272,23 @@ def decide(mesh: Table, packet: Table, work: Table, lanes: Table, room: Table, k
 def any_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
-    """`any_rays` for the rays `alive`, each on its own."""
+    """`any_rays` for the rays `alive`, together where many meet the same, and then each on its own."""
     board(alive, works, all_lanes, room)
+    together = many(mesh, alive, all_lanes)
+    crowd = Crowd(scratch(ALL_PAIRS), scratch(24), advance(room, STACKS), advance(room, TOPS))
+    halt = Halt(begin(packets, works, together, crowd), 0)
+    blocked = any_apart(mesh, packets, t_min, Bundle(alive & ~together, 0), 0, all_lanes, room)
+    while halt.going != 0:
+        halt = any_shared(mesh, packets, t_min, works, all_lanes, crowd, Halt(halt.going, blocked))
+        now = part(mesh, together & ~halt.met, False, all_lanes, room)
+        blocked = any_apart(mesh, packets, t_min, now, halt.met, all_lanes, room)
+    return blocked
+
+
+@kernel
+def any_apart(mesh: Table, packets: Table, t_min: f64, now: Bundle, blocked: i64, all_lanes: Table, room: Table) -> i64:
+    """Find which rays of a bundle are blocked, each on its own; `blocked`: who is known to be."""
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
-    now, blocked = Bundle(alive, 0), 0
     while now.nodes | now.leaves != 0:
         turn, leaves = now.nodes, now.leaves
         now = Bundle(0, 0)

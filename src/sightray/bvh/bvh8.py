@@ -45,7 +45,7 @@ from sightray.mathlib.lanes import (
     vmin8,
 )
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table, f64_at, i32_at, i64_at, i64_put, scratch, vec3_at
+from sightray.mathlib.table import Table, f32_at, f64_at, i32_at, i64_at, i64_put, scratch, vec3_at
 from sightray.mathlib.tally import NODES as VISITS
 from sightray.mathlib.tally import tally
 from sightray.mathlib.vec import Vec3, grey, max3, vabs, vmax, vmin
@@ -98,6 +98,12 @@ class BoxRay(NamedTuple):
 def int_at(table: Table, index: i64) -> i64:
     """32-bit integer number `index` of a table, as one of 64 bits."""
     return int(i32_at(table, index))
+
+
+@kernel
+def float_at(table: Table, index: i64) -> f64:
+    """Float number `index` of a table as a double."""
+    return float(f32_at(table, index))
 
 
 @kernel

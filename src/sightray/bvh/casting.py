@@ -42,8 +42,9 @@ ORIGIN, DIRECTION, END, PRIM = 0, 48, 96, 112
 PACKET_WORDS = 128
 
 # Words of the working memory of a packet, sixteen doubles each: what the decision needs, and origins in the unit frame.
-SLACK, SPEED, START, SHEAR, UNIT_O = 0, 16, 32, 48, 96
-WORK_WORDS = 144
+# Then origins with renamed axes, and two words of bits: whose largest component is z, and y (see `sixteen`).
+SLACK, SPEED, START, SHEAR, UNIT_O, RENAMED_O, BY_Z, BY_Y = 0, 16, 32, 48, 96, 144, 192, 193
+WORK_WORDS = 200
 
 # Floats of a packet's lanes, sixteen each, as boxes and triangles need them: x * R - NEAR is the length to a near plane x,
 # x * R - FAR to a far one; origins and directions in the unit frame; slacks, see `TriangleRay`; and where rays end. Then,
@@ -51,7 +52,7 @@ WORK_WORDS = 144
 R, NEAR, FAR, FROM, TO, SIDE, ALONG, END_AT, PLANES = 0, 48, 96, 144, 192, 240, 256, 272, 288
 LANE_WORDS = 168
 
-NEARBY = 64.0  # rays nearer to the tree than this, in units of it, are cut to its box in single precision
+NEARBY = 512.0  # rays nearer to the tree than this, in units of it, are cut to its box in single precision
 STEEPEST = 1e18  # reciprocal directions are no larger
 MARGIN = 2.0**-10  # the box is larger by so much, so that hits on its faces lie well inside
 
@@ -78,7 +79,7 @@ def cast_packet(mesh: Table, packet: Table, t_min: f64, work: Table, lanes: Tabl
 def cast_near(mesh: Table, packet: Table, t_min: f64, work: Table, lanes: Table) -> i64:
     """`cast_packet` for rays that start at most `NEARBY` away: single precision will do to cut them to the tree's box.
 
-    Its errors there are below 2^-15, and the box is larger by `MARGIN`. Where rays start and end is found in doubles.
+    Its errors there are below 2^-12, and the box is larger by `MARGIN`. Where rays start and end is found in doubles.
     """
     scale, speed = splat16d(f64_at(mesh, SCALE)), load16d(work, SPEED)
     pace, slack = round16(speed), 2.0**-20 + 2.0**-49 * NEARBY
@@ -156,6 +157,21 @@ def cast_alone(work: Table, lanes: Table) -> None:
         put_ints16(lanes, PLANES + 16 * axis, select16d(r > splat16d(0.0), lower, upper))
 
 
+class Largest(NamedTuple):
+    """Rays of a packet, a bit each, by the largest component of their direction; x where neither bit is set."""
+
+    z: i64
+    y: i64  # unless it is z
+
+
+@kernel
+def largest_of(packet: Table) -> Largest:
+    """Which component is the largest, as `triangles.shear` decides it."""
+    x, y = abs16d(load16d(packet, DIRECTION)), abs16d(load16d(packet, DIRECTION + 16))
+    z = abs16d(load16d(packet, DIRECTION + 32))
+    return Largest(movemask16((z >= x) & (z >= y)), movemask16(y >= x))
+
+
 class Shared(NamedTuple):
     """What the rays of a packet have in common."""
 
@@ -171,8 +187,8 @@ def share(packet: Table, lanes: Table, bits: i64) -> Shared:
     up_x = movemask16(load16(lanes, R) > zero) & bits
     up_y = movemask16(load16(lanes, R + 16) > zero) & bits
     up_z = movemask16(load16(lanes, R + 32) > zero) & bits
-    x, y, z = abs16d(load16d(packet, 48)), abs16d(load16d(packet, 64)), abs16d(load16d(packet, 80))
-    by_z, by_y = movemask16((z >= x) & (z >= y)) & bits, movemask16(y >= x) & bits
+    largest = largest_of(packet)
+    by_z, by_y = largest.z & bits, largest.y & bits
     same = (up_x == 0 or up_x == bits) and (up_y == 0 or up_y == bits) and (up_z == 0 or up_z == bits)
     same &= by_z == bits or (by_z == 0 and (by_y == bits or by_y == 0))
     octant = (1 if up_x != 0 else 0) | (2 if up_y != 0 else 0) | (4 if up_z != 0 else 0)

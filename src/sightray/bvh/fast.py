@@ -24,12 +24,11 @@ from sightray.bvh.bundles import (
     Bundle,
     board,
     box_ray_of,
-    float_at,
     lane_of,
     proceed,
     triangle_ray_of,
 )
-from sightray.bvh.bvh8 import CHILD, LEAF, NODES, int_at, pop_near, visit_nearest
+from sightray.bvh.bvh8 import CHILD, LEAF, NODES, float_at, int_at, pop_near, visit_nearest
 from sightray.bvh.casting import ALONG, END, END_AT, LANE_WORDS, PACKET_WORDS, PRIM, SIDE, SPEED, START, WORK_WORDS
 from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, EDGES, NUMBERS, SIDES, TriangleRay
 from sightray.mathlib.lanes import (

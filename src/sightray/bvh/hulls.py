@@ -17,8 +17,7 @@ import math
 from typing import NamedTuple
 
 from sightray._jit import kernel
-from sightray.bvh.bundles import float_at
-from sightray.bvh.bvh8 import STACK_WORDS, Met
+from sightray.bvh.bvh8 import STACK_WORDS, Met, float_at
 from sightray.bvh.casting import END_AT, FROM, SIDE, R
 from sightray.bvh.triangles import EDGES, SIDES
 from sightray.mathlib.lanes import (

@@ -15,14 +15,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sightray._jit import kernel
-from sightray.bvh.bundles import BUNDLE_WORDS, any_in_turns, closest_in_turns, float_at, prefetch_child
-from sightray.bvh.bvh8 import BOTTOM, CHILD, CHILDREN, LEAF, NODE_FLOATS, NODES, int_at, pop_near
+from sightray.bvh.bundles import BUNDLE_WORDS, any_in_turns, closest_in_turns, prefetch_child
+from sightray.bvh.bvh8 import BOTTOM, CHILD, CHILDREN, LEAF, NODE_FLOATS, NODES, float_at, int_at, pop_near
 from sightray.bvh.casting import (
     END,
     END_AT,
     LANE_WORDS,
     PACKET_WORDS,
-    PRIM,
     WORK_WORDS,
     cast_packet,
     share,
@@ -53,7 +52,7 @@ from sightray.bvh.hulls import (
     put_reach,
     put_slabs,
 )
-from sightray.bvh.sixteen import decide_triangle, edge_sizes, filter_triangle, prepare_shear, reach_of
+from sightray.bvh.sixteen import decide_triangle, edge_sizes, filter_triangle, keep_decided, prepare_shear
 from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, INDICES, NUMBERS
 from sightray.mathlib.lanes import (
     count_bits,
@@ -68,12 +67,10 @@ from sightray.mathlib.lanes import (
     push8,
     push_all8,
     select16,
-    select16d,
     sort8,
     splat16,
     splat16d,
     store16,
-    store16d,
 )
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f64_at, i64_at, i64_put, scratch, table_at
@@ -180,30 +177,11 @@ def meet_block_closest(
             if fast:
                 better = keep_nearer(packet, lanes, met.length, prim, maybe)
             else:
-                axis = sheared_axis(group, packet, work, p)
-                better = meet_packet(mesh, packet, work, lanes, axis, at + INDICES, prim, t_min, maybe, found)
+                t = decide_triangle(mesh, packet, work, sheared_axis(group, packet, work, p), at + INDICES)
+                better = keep_decided(packet, work, lanes, t, prim, t_min, maybe, found)
             if better != 0:
                 i64_put(group, MET + p, found | better)
                 put_reach(group, p, lanes)
-
-
-@kernel
-def meet_packet(
-    mesh: Table, packet: Table, work: Table, lanes: Table, axis: i64, at: i64, prim: i64, t_min: f64,
-    maybe: i64, found: i64,
-) -> i64:  # fmt: skip
-    """Decide which of the rays `maybe` meet a triangle nearer than anything so far, and note it."""
-    t = decide_triangle(mesh, packet, work, axis, at)
-    end, number = load16d(packet, END), splat16d(float(prim))
-    # Of two triangles at the same place, the one with the smaller number counts.
-    first = (t < end) | (mask16(found) & (t <= end) & (number < load16d(packet, PRIM)))
-    better = mask16(maybe) & (splat16d(t_min) < t) & first
-    if movemask16(better) != 0:
-        end = select16d(better, t, end)
-        store16d(packet, END, end)
-        store16d(packet, PRIM, select16d(better, number, load16d(packet, PRIM)))
-        store16(lanes, END_AT, select16(better, reach_of(work, end), load16(lanes, END_AT)))
-    return movemask16(better)
 
 
 @kernel
@@ -266,22 +244,26 @@ def meet_block_any(mesh: Table, packets: Table, t_min: f64, block: i64, group: T
 
 @kernel
 def form_groups(
-    mesh: Table, packets: Table, count: i64, t_min: f64, apart: Table, found: Table, room: Table
+    tree: Table, packets: Table, count: i64, t_min: f64, spread: f64, group_spread: f64, apart: Table, found: Table,
+    room: Table,
 ) -> i64:  # fmt: skip
-    """Put packets that go the same way into groups, whose number this is; the rays of the others go to `apart`."""
+    """Put packets that go the same way into groups, whose number this is; the rays of the others go to `apart`.
+
+    The two spreads say how far rays of a packet, and of a group, may lie apart, in the tree's unit frame.
+    """
     groups, alive = 0, scratch(16)
     for first in range(0, count, 4):
         coherent, axes, octants = 0, 0, 0
         for number in range(first, min(first + 4, count)):
             packet, lanes = advance(packets, number * PACKET_WORDS), advance(room, LANES + number * LANE_WORDS)
-            bits = cast_packet(mesh, packet, t_min, advance(room, WORKS + number * WORK_WORDS), lanes)
+            bits = cast_packet(tree, packet, t_min, advance(room, WORKS + number * WORK_WORDS), lanes)
             i64_put(found, number, 0)
             i64_put(alive, number, bits)
             i64_put(apart, number, bits)
             if bits == 0:
                 continue
             shared, bounds, p = share(packet, lanes, bits), extremes(lanes), number - first
-            if shared.same and are_close(bounds, SPREAD):
+            if shared.same and are_close(bounds, spread):
                 axes |= shared.axis << (2 * p)
                 octants |= shared.octant << (4 * p)
                 coherent |= 1 << p
@@ -292,7 +274,7 @@ def form_groups(
             groups += 1
             i64_put(group, FIRST, first)
             i64_put(group, AXES, axes)
-            coherent &= ~gather_group(group, coherent, advance(alive, first), octants, room)
+            coherent &= ~gather_group(group, coherent, advance(alive, first), octants, group_spread, room)
     return groups
 
 
@@ -324,7 +306,7 @@ def note_apart(found: Table, first: i64, count: i64, bits: i64) -> None:
 
 
 @kernel
-def gather_group(group: Table, coherent: i64, alive: Table, octants: i64, room: Table) -> i64:
+def gather_group(group: Table, coherent: i64, alive: Table, octants: i64, spread: f64, room: Table) -> i64:
     """Fill the row of a group with the first coherent packet of four and those that go with it; a bit for each."""
     leader, first = lowest_bit(coherent), i64_at(group, FIRST)
     octant, bounds = octants >> (4 * leader) & 7, extremes_at(advance(room, EXTREMES + 16 * (first + leader)))
@@ -342,7 +324,7 @@ def gather_group(group: Table, coherent: i64, alive: Table, octants: i64, room: 
         if coherent >> p & 1 != 0 and octants >> (4 * p) & 7 == octant:
             its = extremes_at(advance(room, EXTREMES + 16 * (first + p)))
             both = all_joined(bounds, its)
-            if are_close(both, GROUP_SPREAD):
+            if are_close(both, spread):
                 bounds = both
                 members |= 1 << p
                 rays += count_bits(i64_at(alive, p))
@@ -362,7 +344,7 @@ def closest_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Tab
     triangle that comes first.
     """
     apart = scratch(16)
-    groups = form_groups(mesh, packets, count, t_min, apart, found, room)
+    groups = form_groups(mesh, packets, count, t_min, SPREAD, GROUP_SPREAD, apart, found, room)
     if groups > 0:
         closest_together(mesh, packets, t_min, groups, False, room)
         note_groups(groups, found, room)
@@ -378,7 +360,7 @@ def closest_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Tab
 def fast_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
     """`closest_rays`, decided in single precision (see `fast`)."""
     apart = scratch(16)
-    groups = form_groups(mesh, packets, count, t_min, apart, found, room)
+    groups = form_groups(mesh, packets, count, t_min, SPREAD, GROUP_SPREAD, apart, found, room)
     tighten(advance(room, LANES), count)
     if groups > 0:
         closest_together(mesh, packets, t_min, groups, True, room)
@@ -396,7 +378,7 @@ def fast_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table,
 def any_rays(mesh: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
     """The rays of up to sixteen packets that meet the mesh between t_min and their end: bits as for `closest_rays`."""
     apart = scratch(16)
-    groups = form_groups(mesh, packets, count, t_min, apart, found, room)
+    groups = form_groups(mesh, packets, count, t_min, SPREAD, GROUP_SPREAD, apart, found, room)
     if groups > 0:
         any_together(mesh, packets, t_min, groups, room)
         note_groups(groups, found, room)

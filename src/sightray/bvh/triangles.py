@@ -84,7 +84,9 @@ BLOCKS = TREE_WORDS  # pointer to the blocks
 NUMBERS = TREE_WORDS + 1  # pointer to the numbers of the triangles in the blocks: int32
 VERTICES = TREE_WORDS + 2  # pointer to float64 x, y, z
 FACES = TREE_WORDS + 3  # pointer to three int32 a triangle
-MESH_WORDS = TREE_WORDS + 4
+SMALL = TREE_WORDS + 4  # whether rays that leave from one place had better begin together (see `shared`)
+MESH_WORDS = TREE_WORDS + 5
+MOST_BLOCKS = 1 << 16  # of a mesh for that: larger ones wait for memory, which rays in turns do not mind
 
 
 class MeshTree(NamedTuple):
@@ -124,6 +126,7 @@ def pack_mesh(space: Space, row: Table, mesh: MeshTree) -> None:
     link(row, NUMBERS, space.array(mesh.numbers))
     link(row, VERTICES, space.array(mesh.vertices))
     link(row, FACES, space.array(mesh.faces))
+    row.view(np.int64)[SMALL] = len(mesh.blocks) <= MOST_BLOCKS
 
 
 # ------------------------------------------------------------------------------------------------------------ building

@@ -120,6 +120,7 @@ class Compiled:
         self.scene = scene
         self.tables = Tables()
         self.items = list(flatten(scene))
+        self.accelerator = accelerator
         self.merged = merge_small_meshes(self.items) if accelerator.merges_meshes else None
         self.world = self._pack(accelerator)
 
@@ -156,8 +157,8 @@ class Compiled:
 
     @functools.cached_property
     def in_pieces(self) -> bool:
-        """Whether the scene is made of few simple surfaces, which eight rays at once can be met with."""
-        if len(self.items) > MOST or self.scene.medium is not None:
+        """Whether paths may be followed eight at once: few simple surfaces, and no structure that was asked for."""
+        if not self.accelerator.steps_aside or len(self.items) > MOST or self.scene.medium is not None:
             return False
         return pieces_of(self.items, [flags_of(item.material) for item in self.items]) is not None
 

@@ -9,15 +9,8 @@ from __future__ import annotations
 import math
 
 from sightray._jit import kernel
-from sightray.accelerators.item import (
-    MOVED,
-    OBJECT,
-    OBJECT_FROM_WORLD,
-    SHAPE,
-    intersect_item,
-    item_at,
-    occluded_item,
-)
+from sightray.accelerators.item import MOVED, OBJECT, SHAPE, intersect_item, item_at, occluded_item
+from sightray.accelerators.item_packets import bring_packet
 from sightray.bvh.bundles import packet_vec3
 from sightray.bvh.bvh8 import int_at
 from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
@@ -38,7 +31,6 @@ from sightray.mathlib.lanes import (
 from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f64_at, f64_put, i32_put, i64_at, i64_put, scratch, table_at
-from sightray.mathlib.transform import transform_point, transform_vector
 from sightray.mathlib.vec import Vec3
 from sightray.scene.crossings import MESH
 from sightray.scene.query_kernels import LOOK, number_at, step_of, triple_at
@@ -111,11 +103,7 @@ def move_packets(item: Table, packets: Table, count: i64, moved: Table) -> None:
     """Packets in the item's object space; t means the same there."""
     for p in range(count):
         packet, there = advance(packets, p * PACKET_WORDS), advance(moved, p * PACKET_WORDS)
-        for lane in range(16):
-            o = transform_point(item, OBJECT_FROM_WORLD, packet_vec3(packet, ORIGIN + lane))
-            d = transform_vector(item, OBJECT_FROM_WORLD, packet_vec3(packet, DIRECTION + lane))
-            put_lane(there, ORIGIN, lane, o)
-            put_lane(there, DIRECTION, lane, d)
+        bring_packet(item, packet, there)
         store16d(there, END, load16d(packet, END))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from sightray._jit import native
 from sightray.accelerators.bvh import pack_items
 from sightray.accelerators.item import CUTOUT
-from sightray.bvh.packets import ROOM_WORDS
+from sightray.accelerators.item_packets import ITEM_ROOM_WORDS
 from sightray.errors import SceneError
 from sightray.mathlib.table import Table, aligned, table_at
 from sightray.scene.columns import Column, Output, common_shape, numbers
@@ -21,6 +21,7 @@ from sightray.scene.compile import Compiled, compile_scene, world_bounds
 from sightray.scene.crossings import LAYER_WORDS, MESH, OTHER
 from sightray.scene.hits import Details, Hits, Layers
 from sightray.scene.layer_kernels import count_of_rays, layers_of_rays, sieve_layers
+from sightray.scene.many_kernels import any_of_many, closest_of_many
 from sightray.scene.packet_kernels import FEW_ITEMS, any_of_few, closest_of_few, fast_of_few
 from sightray.scene.parallel import run_chunks
 from sightray.scene.query_kernels import any_of_rays, closest_of_rays, describe_hits
@@ -28,6 +29,7 @@ from sightray.scene.world import FLAGS, ITEMS
 from sightray.shapes.mesh import Mesh
 
 PRECISIONS = ("exact", "fast")
+MANY_RAYS = 1 << 15  # that are worth the seconds which compiling packets for many items takes, once
 
 
 class Asked:
@@ -42,6 +44,7 @@ class Asked:
         self.objects = np.array([item.object for item in items], np.int32)
         self.holes = bool(self.world.view(np.int64)[FLAGS] & CUTOUT)  # packets do not know that surfaces may have them
         self.packets = 0 < len(items) <= FEW_ITEMS and MESH in kinds and not self.holes
+        self.many = len(items) > FEW_ITEMS and not self.holes
         self._tree: Table | None = None
         self._kernels: dict[Callable, Callable] = {}
 
@@ -53,21 +56,25 @@ class Asked:
             found = self._kernels[function] = native(function)
         return found
 
-    def closest(self, precision: str) -> Callable:
-        """The kernel for the nearest hit, with its scene: by packets where a mesh is among few items."""
+    def closest(self, n: int, precision: str) -> Callable:
+        """The kernel for the nearest hits of n rays, with its scene: by packets where that is worth it."""
         if self.packets:
-            return self.with_room(fast_of_few if precision == "fast" else closest_of_few)
+            return self.with_room(fast_of_few if precision == "fast" else closest_of_few, self.kinds, len(self.objects))
+        if self.many and n >= MANY_RAYS:
+            return self.with_room(closest_of_many)
         return partial(self.kernel(closest_of_rays), self.world)
 
-    def any(self) -> Callable:
-        """The kernel for any hit, with its scene."""
+    def any(self, n: int) -> Callable:
+        """The kernel for any hit of n rays, with its scene."""
         if self.packets:
-            return self.with_room(any_of_few)
+            return self.with_room(any_of_few, self.kinds, len(self.objects))
+        if self.many and n >= MANY_RAYS:
+            return self.with_room(any_of_many)
         return partial(self.kernel(any_of_rays), self.world)
 
-    def with_room(self, function: Callable) -> Callable:
-        """A kernel of packets, with its scene, and with working memory for each thread."""
-        run = partial(self.kernel(function), self.world, self.kinds, len(self.objects))
+    def with_room(self, function: Callable, *scene: Any) -> Callable:
+        """A kernel of packets, with the rest of its scene, and with working memory for each thread."""
+        run = partial(self.kernel(function), self.world, *scene)
         return lambda *arguments: run(*arguments, room())
 
     def tree(self) -> Table:
@@ -86,7 +93,7 @@ def room() -> Table:
     """Working memory of the calling thread."""
     found = vars(_rooms).get("room")
     if found is None:
-        found = _rooms.room = Table(aligned(ROOM_WORDS, np.int64))
+        found = _rooms.room = Table(aligned(ITEM_ROOM_WORDS, np.int64))
     return found
 
 
@@ -133,7 +140,7 @@ def thread_option(verb: str, threads: Any) -> int | None:
 
 def intersect(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, precision: str, threads: Any) -> Hits:
     rays, ready = Rays("intersect", origins, directions, t_max, t_min, precision, threads), asked(scene)
-    n, run = rays.n, ready.closest(precision)
+    n, run = rays.n, ready.closest(rays.n, precision)
     block = np.empty((5, n), np.int32)  # one piece of memory is allocated, and found by kernels, faster than four
     t, item, shape, primitive = block[:2].reshape(-1).view(np.float64), block[2], block[3], block[4]
     start = Output(t)
@@ -168,7 +175,7 @@ def occluded(
     scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, precision: str, threads: Any
 ) -> np.ndarray:
     rays, ready = Rays("occluded", origins, directions, t_max, t_min, precision, threads), asked(scene)
-    run = ready.any()
+    run = ready.any(rays.n)
     blocked = np.empty(rays.n + 16, np.uint8)  # kernels write four or sixteen answers at a time
 
     output = Output(blocked)

@@ -8,6 +8,7 @@ normalised, so that the ray parameter t is the same number in both spaces. A sha
 - describes in `surface` the point that was hit: outward normal, shading normal, texture coordinates, tangent; and may
   give the outward normal alone in `facing`, for those who need no more, or say by `flat` that it is the same all over a
   primitive;
+- may answer `closest_in_packets` and `any_in_packets` faster than ray by ray;
 - states in `bounds` a box in object space that contains it; infinite for surfaces without end.
 
 Intersections are computed in double precision. A `Hit` carries what `surface` needs beside the point: which
@@ -21,10 +22,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from sightray._jit import implements, method
+from sightray.bvh.bundles import packet_vec3
+from sightray.bvh.casting import DIRECTION, END, ORIGIN, PACKET_WORDS, PRIM
 from sightray.fields import child, other, text
 from sightray.mathlib.hit import Hit, is_hit
+from sightray.mathlib.rays import is_ray
 from sightray.mathlib.scalars import f64, i64
-from sightray.mathlib.table import Table
+from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_put
 from sightray.mathlib.transform import Transform, as_transform
 from sightray.mathlib.vec import Vec3, grey
 from sightray.registry import Member
@@ -113,3 +117,47 @@ def facing(shape: Table, hit: Hit, p: Vec3) -> Vec3:
 @implements(facing, Shape)
 def facing_by_surface(shape: Table, hit: Hit, p: Vec3) -> Vec3:
     return surface(shape, hit, p).normal
+
+
+@method(6)
+def closest_in_packets(shape: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
+    """`intersect` for the rays of packets (see `bvh.casting`), in object space, at time 0.
+
+    Where one is met before its end, `END` and `PRIM` tell where and what; bits of these rays are written to `found`, a
+    word for each packet. `room` is working memory, see `bvh.packets`.
+    """
+    raise NotImplementedError
+
+
+@implements(closest_in_packets, Shape)
+def closest_one_by_one(shape: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
+    for p in range(count):
+        i64_put(found, p, 0)
+        packet = advance(packets, p * PACKET_WORDS)
+        for lane in range(16):
+            end = f64_at(packet, END + lane)
+            o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
+            if t_min < end and is_ray(o, d):
+                hit = intersect(shape, o, d, t_min, end)
+                if hit.t < end:
+                    f64_put(packet, END + lane, hit.t)
+                    f64_put(packet, PRIM + lane, float(hit.prim))
+                    i64_put(found, p, i64_at(found, p) | 1 << lane)
+
+
+@method(7)
+def any_in_packets(shape: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
+    """`occluded` for the rays of packets: bits of those that the shape stops are written to `found`."""
+    raise NotImplementedError
+
+
+@implements(any_in_packets, Shape)
+def any_one_by_one(shape: Table, packets: Table, count: i64, t_min: f64, found: Table, room: Table) -> None:
+    for p in range(count):
+        i64_put(found, p, 0)
+        packet = advance(packets, p * PACKET_WORDS)
+        for lane in range(16):
+            end = f64_at(packet, END + lane)
+            o, d = packet_vec3(packet, ORIGIN + lane), packet_vec3(packet, DIRECTION + lane)
+            if t_min < end and is_ray(o, d) and occluded(shape, o, d, t_min, end):
+                i64_put(found, p, i64_at(found, p) | 1 << lane)

@@ -9,6 +9,7 @@ import numpy as np
 
 from sightray._jit import METHOD_SLOTS, implements, kernel
 from sightray.bvh.few import FEW_WORDS, any_in_mesh, closest_in_mesh, pack_few
+from sightray.bvh.packets import any_rays, closest_rays
 from sightray.bvh.refit import expected_cost, refit_mesh
 from sightray.bvh.triangles import MeshTree, build_mesh, pack_mesh
 from sightray.errors import SceneError
@@ -17,7 +18,17 @@ from sightray.mathlib.hit import Hit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i32_at, is_null, table_at
 from sightray.mathlib.vec import Vec3, cross, dot, grey
-from sightray.shapes.base import Shape, Surface, handedness, intersect, occluded, rise, surface
+from sightray.shapes.base import (
+    Shape,
+    Surface,
+    any_in_packets,
+    closest_in_packets,
+    handedness,
+    intersect,
+    occluded,
+    rise,
+    surface,
+)
 
 WORN = 0.5  # quality of a refitted tree below which another one should be built
 _SLIVER = 1e-15  # twice the area over the longest edge squared, up to which three corners count as on one line
@@ -167,6 +178,8 @@ assert TREE_HEAD == METHOD_SLOTS, "the tree must stand first in a mesh's row"
 
 implements(intersect, Mesh)(closest_in_mesh)
 implements(occluded, Mesh)(any_in_mesh)
+implements(closest_in_packets, Mesh)(closest_rays)
+implements(any_in_packets, Mesh)(any_rays)
 
 
 @kernel

@@ -56,20 +56,6 @@ def gather8v(table: Table, index: I64x8) -> Vec3x8:
 
 
 @kernel
-def load8v(table: Table, index: i64) -> Vec3x8:
-    """Eight vectors, from word `index` on all x, then all y and all z."""
-    return Vec3x8(load8d(table, index), load8d(table, index + 8), load8d(table, index + 16))
-
-
-@kernel
-def store8v(table: Table, index: i64, a: Vec3x8) -> None:
-    """Write eight vectors in that order."""
-    store8d(table, index, a.x)
-    store8d(table, index + 8, a.y)
-    store8d(table, index + 16, a.z)
-
-
-@kernel
 def lines_at(table: Table, index: i64, line: i64) -> Vec3x8:
     """Eight vectors, whose x, y and z are `line` words apart."""
     return Vec3x8(load8d(table, index), load8d(table, index + line), load8d(table, index + 2 * line))
@@ -81,6 +67,18 @@ def put_lines(table: Table, index: i64, line: i64, a: Vec3x8) -> None:
     store8d(table, index, a.x)
     store8d(table, index + line, a.y)
     store8d(table, index + 2 * line, a.z)
+
+
+@kernel
+def load8v(table: Table, index: i64) -> Vec3x8:
+    """Eight vectors, from word `index` on all x, then all y and all z."""
+    return lines_at(table, index, 8)
+
+
+@kernel
+def store8v(table: Table, index: i64, a: Vec3x8) -> None:
+    """Write eight vectors in that order."""
+    put_lines(table, index, 8, a)
 
 
 @kernel

@@ -11,7 +11,7 @@ from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, inf
 from numba.extending import lower_builtin, lower_getattr, models, register_model
 
 from sightray._jit import lower
-from sightray.mathlib import eights, rng
+from sightray.mathlib import eights, rng_llvm
 from sightray.mathlib.lanes_llvm import F32, F64, FLAGS, I1, I32, I64, IntegersType, LanesType, MaskType, _compressed
 from sightray.mathlib.table_llvm import element
 from sightray.mathlib.vec_llvm import lane, llvm_function
@@ -298,23 +298,5 @@ def reverse8(builder: Any, x: Any) -> Any:
     return llvm_function(builder, "llvm.bitreverse.v8i64", INTEGERS, x)
 
 
-def _all(value: int) -> Any:
-    return ir.Constant(INTEGERS, [value] * 8)
-
-
-def _mix(builder: Any, x: Any) -> Any:
-    for shift, factor in rng.MIX:
-        x = builder.mul(builder.xor(x, builder.lshr(x, _all(shift))), _all(factor))
-    return builder.xor(x, builder.lshr(x, _all(31)))
-
-
-@lower(eights.stream8)
-def stream8(builder: Any, key: Any, index: Any) -> Any:
-    inner = _mix(builder, builder.add(key, _all(rng.GOLDEN)))
-    return _mix(builder, builder.add(inner, builder.mul(index, _all(rng.GOLDEN))))
-
-
-@lower(eights.word8)
-def word8(builder: Any, key: Any, dimension: Any) -> Any:
-    step = builder.mul(builder.add(dimension, _all(1)), _all(rng.GOLDEN))
-    return _mix(builder, builder.add(key, step))
+lower(eights.stream8)(rng_llvm.stream)
+lower(eights.word8)(rng_llvm.word)

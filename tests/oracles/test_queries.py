@@ -414,6 +414,7 @@ import numpy as np, sightray as sr, sys, time, _thread, threading
 scene = sr.Scene(*[sr.Sphere(center=(0, 0, z), radius=1 + z / 1000) for z in range(600)])
 o, d = np.zeros((2_000_000, 3)) + (3, 0, -5), np.ones((2_000_000, 3)) * (-0.0001, 0, 1)
 scene.count(o[:10], d[:10])
+scene.intersect_all(o[:10], d[:10])  # so that no compiler is interrupted
 print("ready", flush=True)
 began = time.time()
 try:

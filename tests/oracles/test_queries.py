@@ -410,7 +410,8 @@ def test_two_million_rays_are_not_copied(ball):
 def test_ctrl_c_in_the_middle():
     """A batch of a minute ends within a second or two of Ctrl-C, with `KeyboardInterrupt`."""
     code = """
-import numpy as np, sightray as sr, sys, time, _thread, threading
+import numpy as np, sightray as sr, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which is not there where the tests run in the background
 scene = sr.Scene(*[sr.Sphere(center=(0, 0, z), radius=1 + z / 1000) for z in range(600)])
 o, d = np.zeros((2_000_000, 3)) + (3, 0, -5), np.ones((2_000_000, 3)) * (-0.0001, 0, 1)
 scene.count(o[:10], d[:10])

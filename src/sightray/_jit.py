@@ -27,6 +27,7 @@ Set ``SIGHTRAY_JIT=0`` to run everything as plain Python, ``SIGHTRAY_CACHE_DIR``
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -34,6 +35,7 @@ import importlib
 import marshal
 import os
 import platform
+import signal
 import struct
 import sys
 import tempfile
@@ -306,8 +308,25 @@ class ObjectCode(NamedTuple):
     code: bytes
 
 
+@contextlib.contextmanager
+def interrupts_put_off() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of the block: LLVM calls back into Python, where an exception would be lost."""
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    came: list[tuple[Any, Any]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: came.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if came:
+        handler(*came[0])
+
+
 def _compile(function: Callable) -> ObjectCode:
-    with _lock:
+    with _lock, interrupts_put_off():
         dispatcher = _dispatcher(function)
         (result,) = dispatcher.overloads.values()
         library = result.library

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -214,3 +215,23 @@ def test_private_api_of_numba_is_as_expected():
     (result,) = compiled.overloads.values()
     assert any(f.name == result.fndesc.mangled_name for f in result.library._final_module.functions)
     assert hasattr(cpu_target.target_context.call_conv, "call_function")
+
+
+def test_an_interrupt_while_a_kernel_is_compiled_comes_afterwards():
+    earlier, steps = signal.signal(signal.SIGINT, signal.default_int_handler), []
+
+    def compile_block():
+        with _jit.interrupts_put_off():
+            signal.raise_signal(signal.SIGINT)
+            steps.append("compiled")
+        steps.append("never")
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            compile_block()
+        assert steps == ["compiled"]
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        with _jit.interrupts_put_off():
+            pass
+    finally:
+        signal.signal(signal.SIGINT, earlier)

@@ -12,7 +12,7 @@ from sightray._jit import implements, kernel, native
 from sightray.accelerators.grid import Grid
 from sightray.cameras.base import generate_eight
 from sightray.engine.batches import render_tile_in_batches
-from sightray.integrators.eightpaths import some_piece
+from sightray.integrators.eightpieces import some_piece
 from sightray.materials.base import BsdfSample, sample_bsdf
 from sightray.mathlib.eight_paths import load8v
 from sightray.mathlib.eights import load8d, load8i, splat8i, store8d, store8i
@@ -107,7 +107,7 @@ SCENES = {"lit room": lit_room, "lamps": room_of_lamps, "wide lamp": wide_lamp, 
 def one_at_a_time(scene, tracer, **options):
     """The picture of paths that are followed alone: who shares with nobody does that."""
     alone = sr.SharedPathTracer(share=1, **tracer.values())
-    assert not alone.by_batches
+    assert alone.for_batches(compile_scene(scene)) is None
     return sr.render(scene, alone, **options)
 
 
@@ -276,7 +276,7 @@ class Answers:
 
     def __init__(self, scene, o, d, reach, own):
         compiled = compile_scene(scene)
-        compiled.tables.row_of(sr.PathTracer())
+        compiled.tables.row_of(sr.PathTracer().for_batches(compiled))
         compiled.tables.row_of(default_sampler())
         compiled.tables.prepare(render_tile_in_batches)
         compiled.tables.prepare(ask_both)

@@ -20,6 +20,7 @@ from sightray.engine.schedule import MOST, Schedule, Uniform, filled
 from sightray.film.film import Film
 from sightray.filters.table import filter_table
 from sightray.images import Image
+from sightray.integrators.base import radiance_of_batch
 from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
 from sightray.scene.parallel import core_count
@@ -77,6 +78,7 @@ def run(
     A `KeyboardInterrupt` ends the run within a sample; the outcome then holds what there is.
     """
     camera = require_camera(compiled.scene)
+    integrator = integrator.for_batches(compiled) or integrator
     compiled.tables.row_of(integrator)
     compiled.tables.row_of(sampler)
     began = time.perf_counter()
@@ -85,7 +87,7 @@ def run(
         if progress is not None:
             progress(Progress("compile", done, total, time.perf_counter() - began, 0, name))
 
-    compiled.tables.prepare(_root(integrator, compiled), compiling)
+    compiled.tables.prepare(_root(integrator), compiling)
     film = Film(camera.width, camera.height)
     job = _Job(
         compiled, integrator, sampler, filter, film, samples, seed, limits or Limits(), threads, progress, checkpoint
@@ -101,9 +103,9 @@ def run(
     return Outcome(film, job.rays, job.seconds(), stopped)
 
 
-def _root(integrator: Any, compiled: Compiled) -> Any:
+def _root(integrator: Any) -> Any:
     """The kernel that takes samples as an integrator wants them."""
-    if integrator.by_batches and compiled.in_pieces:
+    if radiance_of_batch in type(integrator).kernels:
         return render_tile_in_batches
     return render_tile if integrator.together == 1 else render_tile_in_groups
 
@@ -137,7 +139,7 @@ class _Job:
         self.options = (expected, int(expected == 1), seed, *((integrator.together,) if self.together else ()))
         self.threads = thread_count(threads)
         self.pool = ThreadPoolExecutor(self.threads)
-        self.kernel = _jit.native(_root(integrator, compiled))
+        self.kernel = _jit.native(_root(integrator))
         self.target: np.ndarray | None = None
         self.rays = self.done = self.total = 0
         self.earlier = 0.0  # seconds that went into the checkpoint

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sightray._jit import kernel, method
 from sightray.cameras.base import Ray
@@ -50,10 +50,9 @@ class Integrator(Member, family="integrators"):
         """Side of the squares of pixels whose rays are to be handed over in groups (`radiance_of_group`); 1: alone."""
         return 1
 
-    @property
-    def by_batches(self) -> bool:
-        """Whether it has `radiance_of_batch`, for scenes of few pieces."""
-        return False
+    def for_batches(self, compiled: Any) -> Integrator | None:
+        """Who follows many rays at once in a scene (`radiance_of_batch`) as this one would alone; None if nobody does."""
+        return None
 
 
 @method(0)
@@ -75,7 +74,7 @@ def radiance_of_group(integrator: Table, world: Table, sights: Table, count: i64
 def radiance_of_batch(integrator: Table, world: Table, batch: Batch) -> i64:
     """Light along the rays of a batch, written into their `FOUND`; returns the number of rays shot.
 
-    Only integrators that say so by `by_batches` are asked, in scenes that are made of pieces (`scene.pieces`).
+    Only integrators that were named by `for_batches` are asked.
     """
     raise NotImplementedError
 

@@ -60,13 +60,15 @@ class PathTracer(Integrator):
         "most that a walk may add at once after its first turn, against fireflies; None for no bias", default=None, above=0,
         optional=True)  # fmt: skip
     spectral: bool = flag("follow wavelengths instead of red, green and blue", default=False)
-    @property
-    def by_batches(self) -> bool:
-        import sightray.integrators.eightpaths  # noqa: F401 - which says how
-
-        return not self.spectral
-
     _bands: Any = derived_array("table of spectra, if spectral", lambda p: band_table() if p.spectral else None)
+
+    def for_batches(self, compiled: Any) -> Integrator | None:
+        from sightray.integrators.eightpieces import _AmongPieces
+        from sightray.integrators.eighttrees import _AmongTrees
+
+        if self.spectral or not compiled.for_eight or type(self).kernels[radiance] is not path_radiance:
+            return None
+        return (_AmongPieces if compiled.in_pieces else _AmongTrees)(**self.values())
 
 
 DEPTH, ROULETTE_DEPTH, LIGHT_SAMPLES, CLAMP, _, BAND_TABLE = PathTracer.offsets()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sightray._jit import implements, kernel
 from sightray.accelerators.item import ItemHit
 from sightray.fields import integer
-from sightray.integrators.base import COLOR, SO_FAR, Radiance, draws_in, radiance_of_group, ray_in, sight_of
+from sightray.integrators.base import COLOR, SO_FAR, Integrator, Radiance, draws_in, radiance_of_group, ray_in, sight_of
 from sightray.integrators.direct import direct_light, lit_normal, look_for_light
 from sightray.integrators.nesting import crossing, outside
 from sightray.integrators.path import (
@@ -74,9 +74,8 @@ class SharedPathTracer(PathTracer):
         "pixels to a side of the squares that share paths; 1: none do", default=6, at_least=1, at_most=8
     )
 
-    @property
-    def by_batches(self) -> bool:
-        return False
+    def for_batches(self, compiled: Any) -> Integrator | None:
+        return None
 
     @property
     def together(self) -> int:

@@ -153,6 +153,11 @@ class Material(Member, family="materials"):
         """Whether it is a sheet with the same medium on both sides, such as a pane or a leaf."""
         return False
 
+    @property
+    def bare(self) -> Material:
+        """What answers light: the material without what only bends its normals or cuts holes into it."""
+        return self
+
 
 def _differs(value: Any) -> bool:
     """Whether a field's value is a texture, or a material with one, that is not the same everywhere."""

@@ -68,6 +68,12 @@ class _Wrapper(Material):
     def painted_glow(self) -> Any:
         return self.material.painted_glow
 
+    @property
+    def bare(self) -> Material:
+        answers = type(self).kernels
+        hands_on = answers[sample_bsdf] is sample_within and answers[bsdf] is bsdf_within
+        return self.material.bare if hands_on else self
+
 
 (INNER,) = _Wrapper.offsets()
 

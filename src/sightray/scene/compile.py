@@ -22,6 +22,7 @@ from sightray.mathlib.transform import IDENTITY, Transform, put_columns
 from sightray.registry import Member
 from sightray.scene import world as world_row
 from sightray.scene.instance import Group, Instance
+from sightray.scene.kinds import are_for_eight, kinds_of, pack_kinds
 from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
 from sightray.scene.parallel import core_count
@@ -136,10 +137,16 @@ class Compiled:
 
         def pack_lights() -> None:
             pack_glow(world, tables, lamps, items, self.items, own)
-            count = int(world.view(np.int64)[world_row.LIGHT_COUNT])
-            link(world, world_row.PIECES, pack_pieces(tables, items, self.items, count))
+
+        def pack_for_eight() -> None:
+            kinds = pack_kinds(tables, [item.material for item in self.items])
+            link(world, world_row.KINDS, kinds)
+            if self.in_pieces:
+                count = int(world.view(np.int64)[world_row.LIGHT_COUNT])
+                link(world, world_row.PIECES, pack_pieces(tables, items, self.items, kinds, count))
 
         tables.once_reached(light_count, pack_lights)
+        tables.once_reached(kinds_of, pack_for_eight)  # after the lights, which whoever asks for kinds reaches, too
         link(world, world_row.TREE, tree)
         link(world, world_row.ITEMS, items)
         world.view(np.int64)[world_row.MERGED] = world_row.NONE if self.merged is None else len(self.items)
@@ -156,11 +163,22 @@ class Compiled:
         return world
 
     @functools.cached_property
+    def for_eight(self) -> bool:
+        """Whether paths may be followed eight at once: nothing moves, and no medium is about."""
+        return self.scene.medium is None and are_for_eight(self.items, self._flags())
+
+    @functools.cached_property
     def in_pieces(self) -> bool:
-        """Whether paths may be followed eight at once: few simple surfaces, and no structure that was asked for."""
-        if not self.accelerator.steps_aside or len(self.items) > MOST or self.scene.medium is not None:
+        """Whether they may do without the tree: few simple surfaces, and no structure that was asked for."""
+        if not self.accelerator.steps_aside or len(self.items) > MOST or not self.for_eight:
             return False
-        return pieces_of(self.items, [flags_of(item.material) for item in self.items]) is not None
+        return pieces_of(self.items, self._flags()) is not None
+
+    def _flags(self) -> list[int]:
+        """What the items' materials are, as in the FLAGS of their rows."""
+        known = {id(item.material): item.material for item in self.items}
+        flags = {key: flags_of(material) for key, material in known.items()}
+        return [flags[id(item.material)] for item in self.items]
 
     def _amid_bodies(self) -> bool:
         """Whether rays of sight may begin in a body that is filled."""

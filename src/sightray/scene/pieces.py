@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sightray.accelerators import item as item_row
-from sightray.materials.base import Material, sample_eight
-from sightray.mathlib.table import Table, aligned, link
+from sightray.mathlib.table import Table, aligned, link, table_at
+from sightray.scene.kinds import KIND_OF, MATERIAL_OF, has_kind
 from sightray.shapes.mesh import Mesh
 from sightray.shapes.rectangle import Rectangle
 from sightray.shapes.sphere import Sphere
@@ -23,16 +23,16 @@ from sightray.shapes.triangle import Triangle
 MOST = 48  # pieces; with more, trees win
 
 # Words of the head: how many there are, then pointers: the pieces; the first of each item's primitives, and the pieces of
-# these; the pieces of lights, and the lights of pieces; a material's row of each class of materials.
-FLATS, BALLS, ROWS, FIRSTS, PIECES_OF, LIGHTS, LIGHT_OF, KINDS, KIND_COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8
-REACH, CHOOSES, CENTER = 9, 10, 12  # largest coordinate about the centre; whether a material asks for `choice`
-HEAD_WORDS = 16
+# these; the pieces of lights, and the lights of pieces.
+FLATS, BALLS, ROWS, FIRSTS, PIECES_OF, LIGHTS, LIGHT_OF = 0, 1, 2, 3, 4, 5, 6
+REACH, CENTER = 7, 8  # largest coordinate about the centre
+HEAD_WORDS = 12
 # A piece, two cache lines. As floats, about the centre of all: n, -n a; U, u0 and V, v0, which give u and v of a point p as
 # U p + u0, V p + v0; the functions of the other edges; slack of places.
 F_NORMAL, F_U, F_V, F_THIRD, F_FOURTH, F_SIDE = 0, 4, 8, 12, 15, 18
-# As doubles: unit normal n and n a, or a ball's centre and radius; then the material's row, and the number of its class.
+# As doubles: unit normal n and n a, or a ball's centre and radius; then the material's row, and the number of its class (see
+# `scene.kinds`).
 NORMAL, OFFSET, MATERIAL, KIND = 10, 13, 14, 15
-GLOWING = 1 << 16  # is added to the number of what glows
 PIECE_WORDS = 16
 SIDE = 384 * 2.0**-24  # slack of places on a piece, see bvh/few.py
 
@@ -53,7 +53,7 @@ def pieces_of(items: Sequence[Any], flags: Sequence[int]) -> tuple[list[Flat], l
     balls: list[int] = []
     for index, (item, flag) in enumerate(zip(items, flags, strict=True)):
         plain = item.transform.is_identity and item.placement is None and not flag & LEFT_OUT
-        if not plain or sample_eight not in type(item.material).kernels or item.material.filled:
+        if not plain or not has_kind(item.material):
             return None
         shape = item.shape
         if isinstance(shape, Sphere):
@@ -110,8 +110,8 @@ def _is_flat_and_convex(corners: np.ndarray) -> bool:
     return bool(level and ((turns @ n) > 1e-6 * size * size).all())
 
 
-def pack_pieces(tables: Any, items: Table, things: Sequence[Any], light_count: int) -> Table | None:
-    """The head of a scene's pieces, or None if it is not made of such."""
+def pack_pieces(tables: Any, items: Table, things: Sequence[Any], kinds: Table, light_count: int) -> Table | None:
+    """The head of a scene's pieces, or None if it is not made of such; `kinds` is the head of its materials."""
     if len(things) > MOST:
         return None
     words = items.view(np.int64).reshape(-1, item_row.ITEM_WORDS)[: len(things)]
@@ -129,28 +129,21 @@ def pack_pieces(tables: Any, items: Table, things: Sequence[Any], light_count: i
     for row, sphere in zip(rows[len(flats) :], spheres, strict=True):
         row[NORMAL : NORMAL + 3], row[OFFSET] = sphere.center, sphere.radius
 
-    kinds: dict[type[Material], int] = {}  # row of a material of each class
     origins = [*((flat.item, flat.prims) for flat in flats), *((index, (0,)) for index in balls)]
     firsts = np.cumsum([0, *(len(thing.shape.faces) if isinstance(thing.shape, Mesh) else 1 for thing in things)])
     numbers, lights, light_of = np.zeros(firsts[-1], np.int64), np.full(light_count, -1), np.full(len(rows), -1)
     integers = rows.view(np.int64)
+    kind_of, material_of = (table_at(kinds, word).view(np.int64) for word in (KIND_OF, MATERIAL_OF))
     for piece, (index, prims) in enumerate(origins):
-        material = things[index].material
-        row = integers[piece]
-        row[MATERIAL] = tables.row_of(material).address
-        row[KIND] = list(kinds).index(type(material)) if type(material) in kinds else len(kinds)
-        kinds.setdefault(type(material), int(row[MATERIAL]))
-        row[KIND] += GLOWING * (material.glow > 0.0)
+        integers[piece, KIND], integers[piece, MATERIAL] = kind_of[index], material_of[index]
         light_of[piece] = words[index, item_row.LIGHT] + words[index, item_row.LIGHT_STEP] * prims[0]
         if light_of[piece] >= 0:
             lights[light_of[piece]] = piece
         numbers[[firsts[index] + prim for prim in prims]] = piece
     head = tables.space.row(HEAD_WORDS)
     counts = head.view(np.int64)
-    counts[FLATS], counts[BALLS], counts[KIND_COUNT] = len(flats), len(balls), len(kinds)
-    counts[CHOOSES] = any(kind.chooses for kind in kinds)
-    for word, values in ((ROWS, rows), (FIRSTS, firsts), (PIECES_OF, numbers), (LIGHTS, lights), (LIGHT_OF, light_of),
-                         (KINDS, np.array(list(kinds.values())))):  # fmt: skip
+    counts[FLATS], counts[BALLS] = len(flats), len(balls)
+    for word, values in ((ROWS, rows), (FIRSTS, firsts), (PIECES_OF, numbers), (LIGHTS, lights), (LIGHT_OF, light_of)):
         link(head, word, tables.space.array(np.ascontiguousarray(values)))
     head.view(np.float64)[CENTER : CENTER + 3], head.view(np.float64)[REACH] = center, np.abs(points - center).max()
     return head

@@ -37,6 +37,7 @@ from sightray.textures.base import Where
 TREE, ITEMS, LIGHTS, LIGHT_COUNT, CAMERA = 0, 1, 2, 3, 4
 MERGED, ORIGIN = 5, 6  # item number of the small meshes put together, or NONE; whose triangles its triangles are
 BACKGROUND, AMBIENT = 8, 12
+KINDS = 7  # the items' materials by class, see scene/kinds.py
 FLAGS, MEDIUM, SKIES, SKY_COUNT, CHOOSER = 16, 17, 18, 19, 20  # SKIES: numbers of the lights that are infinite
 PIECES = 23  # what eight rays are met with at once, see scene/pieces.py; nothing if the scene is not made of such
 AMID = 22  # whether the eye may be inside of a body with a medium

@@ -1,0 +1,283 @@
+"""The walks of `path`, eight side by side, in any scene without media in which nothing moves.
+
+Rays are sent through the tree one after the other, and what a surface is like at a place is looked up one by one: these
+are loads and branches, in which lanes would only wait for each other. What follows is arithmetic, and is done for eight
+at once: the choice of directions and lights, what materials make of them, and all random numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sightray._jit import implements, kernel
+from sightray.accelerators.item import PATTERNED, ItemHit
+from sightray.cameras.base import APART
+from sightray.cameras.base import SPREAD as CAMERA_SPREAD
+from sightray.integrators.base import LINE, SAMPLE, Batch, radiance_of_batch
+from sightray.integrators.direct import lit_normal
+from sightray.integrators.eightpaths import (
+    BEGIN,
+    BETA,
+    COLOR,
+    DENSITY,
+    GOES,
+    MORE,
+    START,
+    Lit8,
+    Onward8,
+    Sent8,
+    Surface8,
+    Taken,
+    choose_way8,
+    enter8,
+    keep_lines,
+    keep_paths,
+    light8,
+    limited8,
+    load_paths,
+    with_skies,
+    write_found,
+)
+from sightray.integrators.path import DEPTH, LIGHT_SAMPLES, LOBE, WIDEST, PathTracer, given_off, limited
+from sightray.integrators.terminator import lifted
+from sightray.mathlib.eight_paths import (
+    frame_about8,
+    grey8,
+    into8,
+    lane_at,
+    lines_at,
+    load8v,
+    out_of8,
+    put_lane,
+    put_lines,
+    store8v,
+)
+from sightray.mathlib.eights import (
+    F64x8,
+    Vec3x8,
+    abs8d,
+    dot8,
+    load8d,
+    load8i,
+    mask8,
+    not8,
+    select8d,
+    select8v,
+    splat8d,
+    splat8i,
+    sqrt8d,
+    store8d,
+    store8i,
+    store_chosen8d,
+    vmax8d,
+    vmin8d,
+    whole8d,
+)
+from sightray.mathlib.lanes import Mask8, count_bits, lowest_bit, movemask8
+from sightray.mathlib.scalars import i64
+from sightray.mathlib.table import (
+    Table,
+    advance,
+    f64_at,
+    f64_put,
+    i64_at,
+    i64_put,
+    no_table,
+    scratch,
+    table_at,
+    table_put,
+)
+from sightray.mathlib.vec import Vec3
+from sightray.samplers.base import nested8, one_of8
+from sightray.scene.kinds import GLOWING, KIND_OF, MATERIAL_OF, ROOM, kinds_of, settle
+from sightray.scene.world import CAMERA, Beam, find_closest, is_blocked, light_count, on_seen_side, point_of
+
+# What is known of a path besides: the normal where its ray began (see `direct.lit_normal`), how wide the ray is there and
+# how fast it widens; then what the ray has met.
+LIT, WIDTH, SPREAD = MORE, MORE + 3 * LINE, MORE + 4 * LINE
+HIT_T, HIT_ITEM, HIT_PRIM, HIT_U, HIT_V = (MORE + k * LINE for k in range(5, 10))
+assert MORE + 10 * LINE == 3808  # as `radiance_of_paths` has it
+
+# Words that surfaces are looked up into, for eight lanes: point, geometric and shading normal, where shadow rays begin, the
+# side that is lit, class and row of the material; then a row of each for what has textures.
+P, NORMAL, SHADING, LIFTED, SIDE, KIND, MATERIAL, ROOMS = 0, 24, 48, 72, 96, 120, 128, 136
+assert ROOMS + 8 * ROOM == 1224  # as `step8` has it
+
+
+class _AmongTrees(PathTracer):
+    """`PathTracer` for scenes whose surfaces are found by a tree."""
+
+
+@implements(radiance_of_batch, _AmongTrees)
+def radiance_of_paths(integrator: Table, world: Table, batch: Batch) -> i64:
+    paths, count = scratch(3808), batch.size
+    for k in range(0, count, 8):
+        enter8(paths, batch.lines, k)
+        widen8(world, paths, batch, k)
+    rays, event = 0, 0
+    while count > 0:
+        left = 0
+        for k in range(count):
+            meet(world, paths, k)
+        for k in range(0, count, 8):
+            taken = step8(integrator, world, paths, batch, k, mask8((1 << min(8, count - k)) - 1), event, left)
+            left, rays = taken.left, rays + taken.rays
+        count = left
+        event += 1
+    return rays
+
+
+@kernel
+def widen8(world: Table, paths: Table, batch: Batch, k: i64) -> None:
+    """How wide the rays of sight of eight paths are, from number k on; see `world.sight_beam`."""
+    camera = table_at(world, CAMERA)
+    taken = vmax8d(whole8d(load8i(batch.lines, SAMPLE + k) + 1), splat8d(float(batch.samples)))
+    share = 1.0 / sqrt8d(taken)
+    store8d(paths, WIDTH + k, share * f64_at(camera, APART))
+    store8d(paths, SPREAD + k, share * f64_at(camera, CAMERA_SPREAD))
+    put_lines(paths, LIT + k, LINE, grey8(0.0))
+
+
+@kernel
+def line_at(paths: Table, index: i64) -> Vec3:
+    """A vector of one path."""
+    return Vec3(f64_at(paths, index), f64_at(paths, index + LINE), f64_at(paths, index + 2 * LINE))
+
+
+@kernel
+def meet(world: Table, paths: Table, k: i64) -> None:
+    """Send the ray of path number k to its nearest surface."""
+    hit = find_closest(world, line_at(paths, START + k), line_at(paths, GOES + k), f64_at(paths, BEGIN + k), math.inf)
+    f64_put(paths, HIT_T + k, hit.t)
+    i64_put(paths, HIT_ITEM + k, hit.item)
+    i64_put(paths, HIT_PRIM + k, hit.prim)
+    f64_put(paths, HIT_U + k, hit.u)
+    f64_put(paths, HIT_V + k, hit.v)
+
+
+@kernel
+def look_up(integrator: Table, world: Table, paths: Table, k: i64, words: Table, lane: i64, event: i64) -> None:
+    """What the surface is like that path number k has met, as lane number `lane` of `words`; what it gives off is added."""
+    hit = ItemHit(
+        f64_at(paths, HIT_T + k), i64_at(paths, HIT_ITEM + k), i64_at(paths, HIT_PRIM + k), f64_at(paths, HIT_U + k),
+        f64_at(paths, HIT_V + k),
+    )  # fmt: skip
+    o, d = line_at(paths, START + k), line_at(paths, GOES + k)
+    beam = Beam(f64_at(paths, WIDTH + k), f64_at(paths, SPREAD + k), no_table())
+    point = on_seen_side(point_of(world, hit, o, d, beam), d)
+    put_lane(words, P + lane, point.p)
+    put_lane(words, NORMAL + lane, point.normal)
+    put_lane(words, SHADING + lane, point.shading)
+    put_lane(words, SIDE + lane, lit_normal(point))
+    if light_count(world) > 0:
+        put_lane(words, LIFTED + lane, lifted(world, hit, point))
+    kinds = kinds_of(world)
+    number, row = i64_at(table_at(kinds, KIND_OF), hit.item), table_at(table_at(kinds, MATERIAL_OF), hit.item)
+    kind = number & (GLOWING - 1)
+    if number != kind:
+        lit, density = line_at(paths, LIT + k), f64_at(paths, DENSITY + k)
+        light = line_at(paths, BETA + k) * given_off(world, point, o, lit, d, hit.t, density, no_table())
+        found = line_at(paths, COLOR + k) + limited(integrator, light, event)
+        f64_put(paths, COLOR + k, found.x)
+        f64_put(paths, COLOR + LINE + k, found.y)
+        f64_put(paths, COLOR + 2 * LINE + k, found.z)
+    i64_put(words, KIND + lane, kind)
+    if point.flags & PATTERNED != 0:
+        room = advance(words, ROOMS + lane * ROOM)
+        settle(kinds, kind, row, point.where, room)
+        row = room
+    table_put(words, MATERIAL + lane, row)
+
+
+@kernel
+def step8(
+    integrator: Table, world: Table, lines: Table, batch: Batch, first: i64, chosen: Mask8, event: i64, left: i64
+) -> Taken:
+    """Go on with eight paths, from number `first` on, where they have met something; see `eightpieces.step8`."""
+    words = scratch(1224)
+    store8i(words, KIND, splat8i(-1))
+    going = chosen & (load8i(lines, HIT_ITEM + first) >= 0)
+    missed, rays = chosen & not8(going), count_bits(movemask8(chosen))
+    bits = movemask8(going)
+    while bits != 0:
+        k = lowest_bit(bits)
+        bits &= bits - 1
+        look_up(integrator, world, lines, first + k, words, k, event)
+    paths = load_paths(lines, first, batch)
+    color = paths.found
+    if movemask8(missed) != 0:
+        sent = Sent8(paths.o, lines_at(lines, LIT + first, LINE), paths.d, paths.density, paths.beta)
+        color = with_skies(integrator, world, sent, color, missed, event)
+    if event >= i64_at(integrator, DEPTH) or movemask8(going) == 0:
+        write_found(batch.lines, paths.place, color, movemask8(chosen))
+        return Taken(left, rays)
+
+    # Choose where to go on, and whether to.
+    own, p, t = nested8(paths.draws, event), load8v(words, P), load8d(lines, HIT_T + first)
+    frame = frame_about8(load8v(words, SHADING))
+    wo = into8(frame, -paths.d)
+    size = vmax8d(vmax8d(abs8d(p.x), abs8d(p.y)), abs8d(p.z))
+    t_min = vmax8d(t, size) * 1e-9
+    here = Surface8(p, load8v(words, SIDE), load8i(words, KIND), load8i(words, MATERIAL), t_min, frame, wo)
+    onward = choose_way8(integrator, world, here, own, paths.beta, going, event)
+
+    # Look for lights.
+    count = i64_at(integrator, LIGHT_SAMPLES) if event == 0 else 1
+    for k in range(count if light_count(world) > 0 else 0):
+        lit = light8(world, here, one_of8(own, k, count), going)
+        asked = count_bits(movemask8(lit.asked))
+        if asked > 0:
+            bright = unblocked8(world, here, load8v(words, LIFTED), lit)
+            brought = limited8(integrator, paths.beta * lit.light, event + 1) * (1.0 / count)
+            color = select8v(bright, color + brought, color)
+            rays += asked
+
+    write_found(batch.lines, paths.place, color, movemask8(chosen & not8(onward.on)))
+    passes = wo.z * onward.next.wi.z < 0.0
+    d = on_true_side8(load8v(words, NORMAL), paths.d, out_of8(frame, onward.next.wi), passes)
+    widen_on8(lines, first, left, onward, t)
+    keep_lines(lines, LIT + left, here.lit, onward.on)
+    keep_paths(lines, left, paths, p, d, onward, color, t_min)
+    return Taken(left + count_bits(movemask8(onward.on)), rays)
+
+
+@kernel
+def widen_on8(lines: Table, first: i64, left: i64, onward: Onward8, t: F64x8) -> None:
+    """How wide the rays are that go on; see `path.onward`."""
+    width, spread = load8d(lines, WIDTH + first), load8d(lines, SPREAD + first)
+    density = onward.next.density
+    lobe = LOBE / sqrt8d(vmax8d(density, splat8d(1e-300)))
+    wider = vmin8d(splat8d(WIDEST), vmax8d(spread, lobe))
+    store_chosen8d(lines, WIDTH + left, width + spread * t, onward.on)
+    store_chosen8d(lines, SPREAD + left, select8d(density <= 0.0, spread, wider), onward.on)
+
+
+@kernel
+def on_true_side8(normal: Vec3x8, d: Vec3x8, way: Vec3x8, passes: Mask8) -> Vec3x8:
+    """`shading.on_true_side` for eight paths."""
+    facing = dot8(normal, way)
+    through = facing * dot8(normal, d) > 0.0
+    right = (through & passes) | not8(through | passes)
+    return select8v(right, way, way - normal * (2.0 * facing))
+
+
+@kernel
+def unblocked8(world: Table, here: Surface8, start: Vec3x8, lit: Lit8) -> Mask8:
+    """Which lights arrive; shadow rays begin at `start`, but at the surface itself where light comes from behind."""
+    words = scratch(64)
+    start = select8v(lit.passes, here.p, start)
+    step = start - here.p
+    moved = (dot8(step, step) > 0.0) & (lit.distance < math.inf)  # see `terminator.shadow_ray`
+    way = lit.direction * select8d(moved, lit.distance, splat8d(1.0)) - step
+    size = sqrt8d(dot8(way, way))
+    store8v(words, 0, start)
+    store8v(words, 24, select8v(moved, way * (1.0 / size), lit.direction))
+    store8d(words, 48, here.t_min)
+    store8d(words, 56, select8d(moved, size, lit.distance) - here.t_min)
+    bits, found = movemask8(lit.asked), 0
+    while bits != 0:
+        k = lowest_bit(bits)
+        bits &= bits - 1
+        if not is_blocked(world, lane_at(words, k), lane_at(words, 24 + k), f64_at(words, 48 + k), f64_at(words, 56 + k)):
+            found |= 1 << k
+    return mask8(found)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sightray._jit import kernel, native
-from sightray.mathlib.distribution import cumulated, draw_cell
+from sightray.mathlib.distribution import cumulated, draw_cell, eights, within_from
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put
 
@@ -42,7 +42,7 @@ def pictures():
 def test_cells_are_those_whose_sums_hold_the_numbers(weights):
     h, w = weights.shape
     table = cumulated(weights)
-    rows, within = table[: h + 1], table[h + 1 : h + 1 + h * (w + 1)].reshape(h, w + 1)
+    rows, within = table[: h + 1], table[within_from(w, h) :].reshape(h, 8 * eights(w))[:, : w + 1]
     rng = np.random.default_rng(2)
     # Numbers anywhere, and at and beside the sums.
     sums = np.concatenate([rows, within.ravel()])

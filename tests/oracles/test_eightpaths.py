@@ -188,7 +188,7 @@ def made_of_pieces(*things, **options):
 
 
 @pytest.mark.parametrize("material", [
-    sr.OrenNayar(albedo=0.5), sr.Lambert(albedo=sr.Checker()), sr.Glass(absorption=(1, 2, 3)),
+    sr.Mix(a=sr.Mirror(), b=sr.Lambert()), sr.Lambert(albedo=sr.Checker()), sr.Glass(absorption=(1, 2, 3)),
     sr.Cutout(material=sr.Lambert(), opacity=0.5), sr.NormalMap(material=sr.Lambert(), map=sr.Checker()),
     sr.TwoSided(material=sr.Lambert(), back=sr.Mirror()), sr.Emitter(radiance=sr.Checker()),
 ])  # fmt: skip

@@ -107,7 +107,28 @@ def room_of_lamps():
     return sr.Scene(bumpy_mesh(material=sr.Mirror()), coarse_ball(4), glow, *lamps, camera=EYE)
 
 
-TREES = {"lamps": room_of_lamps, "textures": textured_hills, "places": placed_things, "smooth": smooth_ball_by_a_lamp}
+def odd_materials():
+    """Materials without forms for eight paths among others, an anisotropic one, things that move, a rolling shutter."""
+    mixed = sr.Mix(a=sr.Lambert(albedo=sr.Checker(scale=0.3)), b=sr.Mirror(), amount=sr.Bitmap(image=picture(7)))
+    sides = sr.TwoSided(material=sr.Lambert(albedo=(0.8, 0.3, 0.2)), back=sr.Emitter(radiance=2))
+    brushed = sr.Conductor(metal="Cu", roughness=0.3, anisotropy=0.7)
+    ball, away = sr.Sphere(radius=0.3, material=sr.Lambert(albedo=0.7)), sr.Transform.translate(0.6, 0.3, 0)
+    return sr.Scene(
+        bumpy_mesh(material=mixed), coarse_ball(4, material=brushed, transform=sr.Transform.scale(0.5)),
+        sr.Rectangle(corner=(-1.2, 0.2, -0.5), edge_u=(0.8, 0, 0), edge_v=(0, 0.6, 0.3), material=sides),
+        sr.Instance(of=ball, motion=[(0, sr.Transform.translate(0.5, 0.4, 0.5)), (1, away)]),
+        sr.EnvironmentLight(radiance=0.5), sr.PointLight(position=(1, 3, 1), intensity=3),
+        camera=EYE.replace(shutter_open=0.1, shutter_close=0.6, readout=0.3),
+    )  # fmt: skip
+
+
+TREES = {
+    "odd": odd_materials,
+    "lamps": room_of_lamps,
+    "textures": textured_hills,
+    "places": placed_things,
+    "smooth": smooth_ball_by_a_lamp,
+}
 
 
 def followed_by(scene, tracer=None, accelerator=None):
@@ -121,7 +142,7 @@ def test_paths_among_trees_are_the_same_as_one_at_a_time(name, options):
     assert followed_by(scene) is _AmongTrees
     eight, one = sr.render(scene, tracer, samples=5), one_at_a_time(scene, tracer, samples=5)
     assert_same(eight, one)
-    assert eight.info["rays"] == pytest.approx(one.info["rays"], rel=1e-3)
+    assert eight.info["rays"] == pytest.approx(one.info["rays"], rel=2e-3)
 
 
 def test_paths_among_pieces_are_the_same_by_trees():
@@ -152,14 +173,12 @@ def test_who_changes_the_tracer_is_asked_for_each_ray():
     np.testing.assert_array_equal(sr.render(textured_hills(), Absent(), samples=1), 0.25)
 
 
-@pytest.mark.parametrize("thing", [
-    sr.Sphere(material=sr.Glass(absorption=(1, 2, 3))), sr.Sphere(material=sr.Mix(a=sr.Lambert(), b=sr.Mirror())),
-    sr.Sphere(material=sr.TwoSided(material=sr.Lambert(), back=sr.Mirror())),
-    sr.Sphere(material=sr.Conductor(roughness=0.3, anisotropy=0.5)),
-    sr.Instance(of=sr.Sphere(), motion=[(0, sr.Transform()), (1, sr.Transform.translate(1, 0, 0))]),
+@pytest.mark.parametrize("material", [
+    sr.Glass(absorption=(1, 2, 3)), sr.Mix(a=sr.Lambert(), b=sr.Mirror()), sr.Subsurface(preset="skin1"),
+    sr.Boundary(interior=sr.HomogeneousMedium(absorption=1)),
 ])  # fmt: skip
-def test_what_cannot_go_eight_abreast_is_followed_alone(thing):
-    assert sr.PathTracer().for_batches(compile_scene(sr.Scene(thing, camera=EYE))) is None
+def test_what_is_filled_and_what_has_no_forms_is_followed_alone(material):
+    assert sr.PathTracer().for_batches(compile_scene(sr.Scene(sr.Sphere(material=material), camera=EYE))) is None
 
 
 def test_media_wavelengths_and_other_tracers_are_followed_alone():

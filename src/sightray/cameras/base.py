@@ -178,12 +178,11 @@ def generate_one_by_one(camera: Table, x: F64x8, y: F64x8, lens_u: F64x8, lens_v
 
 
 @kernel
-def sight_rays(camera: Table, x: F64x8, y: F64x8, lens_u: F64x8, lens_v: F64x8, time_u: F64x8) -> Rays8:
-    """`sight_ray` for eight places and moments, in scenes where nothing but the camera moves."""
+def moments(camera: Table, y: F64x8, time_u: F64x8) -> F64x8:
+    """When eight rays through these rows are sent, in seconds; see `sight_ray`."""
     start = f64_at(camera, SHUTTER_OPEN)
     row = y * (f64_at(camera, READOUT) / i64_at(camera, HEIGHT))
-    time = time_u * (f64_at(camera, SHUTTER_CLOSE) - start) + row + start
-    return generate_eight(camera, x, y, lens_u, lens_v, time)
+    return time_u * (f64_at(camera, SHUTTER_CLOSE) - start) + row + start
 
 
 class _Pinhole(Camera):

@@ -7,9 +7,10 @@ what they find is added to the film in the order of the samples. So the picture 
 from __future__ import annotations
 
 from sightray._jit import kernel
-from sightray.cameras.base import CHANCE, MOMENT, sight_rays
+from sightray.cameras.base import CHANCE, MOMENT, generate_eight, moments
 from sightray.cameras.base import LENS as THROUGH_LENS
-from sightray.engine.pixels import LENS, PLACE, TIME
+from sightray.engine.pixels import LENS, PLACE
+from sightray.engine.pixels import TIME as WHEN
 from sightray.film.film import add_sample, samples_taken
 from sightray.filters.table import sample_filter8
 from sightray.integrators.base import (
@@ -21,6 +22,7 @@ from sightray.integrators.base import (
     ORIGIN,
     PIXEL,
     SAMPLE,
+    TIME,
     WAY,
     Batch,
     radiance_of_batch,
@@ -36,7 +38,7 @@ from sightray.scene.world import CAMERA
 # What the engine notes beside a batch's rays: the pixel's place in the film, the sample's weight, the pixel's middle, and
 # whether the sample goes there.
 SPOT, WEIGHT, X, Y, CENTRED = (MINE_TOO + k * LINE for k in range(5))
-assert MINE_TOO + 5 * LINE == 2312  # as `render_tile_in_batches` has it
+assert MINE_TOO + 5 * LINE == 2448  # as `render_tile_in_batches` has it
 
 
 @kernel
@@ -45,7 +47,7 @@ def render_tile_in_batches(
     x0: i64, y0: i64, x1: i64, y1: i64, width: i64, expected: i64, centred: i64, seed: i64,
 ) -> i64:  # fmt: skip
     """`render_tile` for integrators that take many rays at once."""
-    batch = scratch(2312)
+    batch = scratch(2448)
     rays, count = 0, 0
     first = begin(sampler, x0, y0, seed, 0, expected)  # of all it has the number of samples, and of dimensions
     for y in range(y0, y1):
@@ -109,12 +111,13 @@ def aim8(world: Table, filters: Table, batch: Table, k: i64, draws: Draws8) -> N
     if chance & THROUGH_LENS != 0:
         lens = pair8(draws, LENS)
     if chance & MOMENT != 0:
-        when = pair8(draws, TIME).u
+        when = pair8(draws, WHEN).u
     fx, fy = sample_filter8(filters, place.u), sample_filter8(filters, place.v)
     off = load8d(batch, CENTRED + k)
-    ray = sight_rays(
-        camera, load8d(batch, X + k) + fx.offset * off, load8d(batch, Y + k) + fy.offset * off, lens.u, lens.v, when
-    )  # fmt: skip
+    x, y = load8d(batch, X + k) + fx.offset * off, load8d(batch, Y + k) + fy.offset * off
+    time = moments(camera, y, when)
+    ray = generate_eight(camera, x, y, lens.u, lens.v, time)
+    store8d(batch, TIME + k, time)
     store8d(batch, WEIGHT + k, select8d(off > 0.0, fx.weight * fy.weight, splat8d(1.0)))
     put_lines(batch, ORIGIN + k, LINE, ray.origin)
     put_lines(batch, WAY + k, LINE, ray.direction)

@@ -19,10 +19,10 @@ SIGHT_WORDS = 24
 
 
 # Lines of a batch, in each of which there is one word for each ray and room for eight more: the ray, the light that it is
-# found to bring, its draws, and lines of the caller's own.
+# found to bring, its draws, its moment in seconds, and lines of the caller's own.
 BATCH = 128  # most rays
 LINE = BATCH + 8
-ORIGIN, WAY, FOUND, KEY, PIXEL, SAMPLE, MINE_TOO = (k * LINE for k in (0, 3, 6, 9, 10, 11, 12))
+ORIGIN, WAY, FOUND, KEY, PIXEL, SAMPLE, TIME, MINE_TOO = (k * LINE for k in (0, 3, 6, 9, 10, 11, 12, 13))
 
 
 class Batch(NamedTuple):

@@ -11,20 +11,20 @@ otherwise.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sightray._jit import kernel
 from sightray.integrators.base import FOUND, KEY, LINE, ORIGIN, PIXEL, SAMPLE, Batch
 from sightray.integrators.base import WAY as WAY_OUT
-from sightray.integrators.direct import LIGHT, PLACE, light_of_skies
-from sightray.integrators.path import CHOICE, CLAMP, ROULETTE_DEPTH, WAY, limited
-from sightray.lights.base import WHOLE, LightSample8, illuminate, illuminate_eight
+from sightray.integrators.direct import LIGHT, PLACE
+from sightray.integrators.path import CHOICE, CLAMP, ROULETTE_DEPTH, WAY
+from sightray.lights.base import WHOLE, LightSample8, density_eight, illuminate, illuminate_eight, sky_eight
 from sightray.materials.base import Sample8, Value8, bsdf_eight, sample_eight
 from sightray.mathlib.eight_paths import (
     Frame8,
     brightest8,
     grey8,
-    into8,
     lane_at,
     lines_at,
     load8v,
@@ -59,16 +59,16 @@ from sightray.mathlib.table import (
     f64_put,
     i64_at,
     i64_put,
-    no_table,
     scratch,
     table_at,
     vec3_at,
     words_to,
 )
+from sightray.mathlib.vec import Vec3, grey
 from sightray.samplers.base import Draws8, Pair8, pair8
 from sightray.scene.kinds import CHOOSES, COUNT, ROWS, kinds_of
-from sightray.scene.light_choice import choose_light
-from sightray.scene.world import BACKGROUND, SKY_COUNT, light_at, light_count
+from sightray.scene.light_choice import choose_light, light_probability
+from sightray.scene.world import BACKGROUND, SKIES, SKY_COUNT, light_at, light_count
 
 # What is known of a path: where its next ray begins and goes, its throughput, what it has found, the density of the
 # direction, from where on the ray counts, its random numbers, and which of the batch it is; then come lines of the caller's.
@@ -108,15 +108,25 @@ class Surface8(NamedTuple):
     wo: Vec3x8
 
 
+class Lamp8(NamedTuple):
+    """One point of one light for each of eight surfaces."""
+
+    sample: LightSample8
+    number: I64x8  # of the light
+
+
 class Lit8(NamedTuple):
     """Light that may arrive, and is sent on."""
 
     light: Vec3x8  # what the surface makes of it, weighed
-    direction: Vec3x8
-    distance: F64x8
-    number: I64x8  # of the light
-    passes: Mask8  # where it comes from behind the surface
     asked: Mask8  # where it is worth a shadow ray
+
+
+class Way8(NamedTuple):
+    """Numbers by which paths choose where to go on, and whether to."""
+
+    turn: Pair8
+    choice: Pair8
 
 
 class Onward8(NamedTuple):
@@ -184,31 +194,34 @@ def keep_lines(paths: Table, index: i64, a: Vec3x8, chosen: Mask8) -> None:
 
 
 @kernel
-def choose_way8(
-    integrator: Table, world: Table, here: Surface8, own: Draws8, beta: Vec3x8, going: Mask8, event: i64
-) -> Onward8:
-    """Choose where to go on, and whether to."""
-    kinds = kinds_of(world)
-    way, choice = pair8(own, WAY), Pair8(splat8d(0.0), splat8d(0.0))
-    if i64_at(kinds, CHOOSES) != 0 or event >= i64_at(integrator, ROULETTE_DEPTH):
+def way8(integrator: Table, world: Table, own: Draws8, event: i64) -> Way8:
+    """Draw the numbers by which paths go on; those that nobody asks for are 0."""
+    turn, choice = pair8(own, WAY), Pair8(splat8d(0.0), splat8d(0.0))
+    if i64_at(kinds_of(world), CHOOSES) != 0 or event >= i64_at(integrator, ROULETTE_DEPTH):
         choice = pair8(own, CHOICE)
-    next = sample_of_kinds(kinds, here, way, choice.u)
+    return Way8(turn, choice)
+
+
+@kernel
+def go_on8(integrator: Table, next: Sample8, way: Way8, beta: Vec3x8, going: Mask8, event: i64) -> Onward8:
+    """Decide which paths go on to `next`."""
     beta = beta * next.weight
     odds = survival8(integrator, beta, event + 1)
     if event >= i64_at(integrator, ROULETTE_DEPTH):
         beta = beta * (1.0 / odds)
-    return Onward8(next, beta, going & (choice.v < odds))
+    return Onward8(next, beta, going & (way.choice.v < odds))
 
 
 @kernel
-def sample_of_kinds(kinds: Table, here: Surface8, way: Pair8, choice: F64x8) -> Sample8:
+def sample_of_kinds(kinds: Table, here: Surface8, way: Way8) -> Sample8:
     """The materials' choices of directions: one class of materials after the other."""
     wi, weight, density = here.wo, grey8(0.0), splat8d(0.0)
     for k in range(i64_at(kinds, COUNT)):
         mine = here.kind == k
         if movemask8(mine) != 0:
             material = table_at(table_at(kinds, ROWS), k)
-            found = sample_eight(material, rows_of(material, here.material, mine), here.wo, way.u, way.v, choice)
+            rows = rows_of(material, here.material, mine)
+            found = sample_eight(material, rows, here.wo, way.turn.u, way.turn.v, way.choice.u)
             wi, weight = select8v(mine, found.wi, wi), select8v(mine, found.weight, weight)
             density = select8d(mine, found.density, density)
     return Sample8(wi, weight, density)
@@ -234,23 +247,24 @@ def rows_of(material: Table, address: I64x8, mine: Mask8) -> I64x8:
 
 
 @kernel
-def light8(world: Table, here: Surface8, own: Draws8, going: Mask8) -> Lit8:
+def lamp8(world: Table, here: Surface8, own: Draws8, going: Mask8) -> Lamp8:
     """Choose a light and one of its points for eight surfaces; see `direct.look_for_light`."""
-    place, number = pair8(own, PLACE), splat8i(0)
+    place = pair8(own, PLACE)
     if light_count(world) == 1:
-        sample = illuminate_eight(light_at(world, 0), here.p, place.u, place.v)
-    else:
-        words = scratch(72)
-        illuminate_by_chosen(world, here, pair8(own, LIGHT).u, place, words, movemask8(going))
-        sample = LightSample8(load8v(words, 0), load8d(words, 48), load8v(words, 24), load8d(words, 56))
-        number = load8i(words, 64)
-    wi = into8(here.frame, sample.direction)
-    answer = bsdf_of_kinds(kinds_of(world), here, wi)
-    q = sample.density
+        return Lamp8(illuminate_eight(light_at(world, 0), here.p, place.u, place.v), splat8i(0))
+    words = scratch(72)
+    illuminate_by_chosen(world, here, pair8(own, LIGHT).u, place, words, movemask8(going))
+    sample = LightSample8(load8v(words, 0), load8d(words, 48), load8v(words, 24), load8d(words, 56))
+    return Lamp8(sample, load8i(words, 64))
+
+
+@kernel
+def lit_by8(here: Surface8, lamp: Lamp8, answer: Value8, going: Mask8) -> Lit8:
+    """What surfaces make of the light of lamps, if it arrives, by their materials' answers."""
+    q = lamp.sample.density
     weight = select8d(q > 0.0, q * q / (q * q + answer.density * answer.density), splat8d(1.0))
-    light = answer.value * sample.irradiance * weight
-    asked = going & (brightest8(light) > 0.0)
-    return Lit8(light, sample.direction, sample.distance, number, here.wo.z * wi.z < 0.0, asked)
+    light = answer.value * lamp.sample.irradiance * weight
+    return Lit8(light, going & (brightest8(light) > 0.0))
 
 
 @kernel
@@ -312,27 +326,18 @@ class Sent8(NamedTuple):
 
 @kernel
 def with_skies(integrator: Table, world: Table, sent: Sent8, color: Vec3x8, missed: Mask8, event: i64) -> Vec3x8:
-    """What paths have found, with what rays bring that meet nothing."""
-    if i64_at(world, SKY_COUNT) > 0:
-        return add_skies(integrator, world, sent, color, movemask8(missed), event)
-    behind = sent.beta * splat8v(vec3_at(world, BACKGROUND))
-    return select8v(missed, color + limited8(integrator, behind, event), color)
-
-
-@kernel
-def add_skies(integrator: Table, world: Table, sent: Sent8, color: Vec3x8, bits: i64, event: i64) -> Vec3x8:
-    """What the rays in `bits`, which meet nothing, bring."""
-    words = scratch(128)
-    store_sent(words, sent)
-    store8v(words, 104, color)
-    while bits != 0:
-        k = lowest_bit(bits)
-        bits &= bits - 1
-        light = light_of_skies(
-            world, lane_at(words, k), lane_at(words, 56 + k), lane_at(words, 24 + k), f64_at(words, 48 + k), no_table()
-        )  # fmt: skip
-        put_lane(words, 104 + k, lane_at(words, 104 + k) + limited(integrator, lane_at(words, 80 + k) * light, event))
-    return load8v(words, 104)
+    """What paths have found, with what rays bring that meet nothing; see `direct.light_of_skies`."""
+    behind = splat8v(vec3_at(world, BACKGROUND))
+    d = select8v(missed, sent.d, splat8v(Vec3(0.0, 1.0, 0.0)))  # other lanes may hold anything
+    for k in range(i64_at(world, SKY_COUNT)):
+        index = i64_at(table_at(world, SKIES), k)
+        light = light_at(world, index)
+        chance = light_probability(world, grey(0.0), grey(0.0), index)  # skies stand apart: it is the same everywhere
+        p, q = sent.density, density_eight(light, sent.o, d, splat8d(math.inf)) * chance
+        found_by_both = (p > 0.0) & (q > 0.0)
+        weight = select8d(found_by_both, p * p / (p * p + q * q), splat8d(1.0))
+        behind = behind + sky_eight(light, d) * weight
+    return select8v(missed, color + limited8(integrator, sent.beta * behind, event), color)
 
 
 @kernel

@@ -17,13 +17,17 @@ from sightray.integrators.eightpaths import (
     Sent8,
     Surface8,
     Taken,
-    choose_way8,
+    bsdf_of_kinds,
     enter8,
+    go_on8,
     keep_paths,
-    light8,
+    lamp8,
     limited8,
+    lit_by8,
     load_paths,
+    sample_of_kinds,
     store_sent,
+    way8,
     with_skies,
     write_found,
 )
@@ -64,7 +68,7 @@ from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, advance, f64_at, i64_at, i64_put, no_table, scratch, table_at
 from sightray.mathlib.vec import grey
 from sightray.samplers.base import nested8, one_of8
-from sightray.scene.kinds import GLOWING
+from sightray.scene.kinds import GLOWING, NUMBER, kinds_of
 from sightray.scene.piece_kernels import Met8, Shade8, Spot8, blocked8, meet8, spot8
 from sightray.scene.pieces import (
     FIRSTS,
@@ -135,20 +139,23 @@ def step8(
     size = vmax8d(vmax8d(abs8d(spot.p.x), abs8d(spot.p.y)), abs8d(spot.p.z))
     t_min, material = vmax8d(spot.t, size) * 1e-9, gather8i(rows, offset + MATERIAL)
     lit_side = select8v(wo.z >= 0.0, spot.normal, -spot.normal)
-    here = Surface8(spot.p, lit_side, kind & (GLOWING - 1), material, t_min, frame, wo)
-    onward = choose_way8(integrator, world, here, own, paths.beta, going, event)
+    here = Surface8(spot.p, lit_side, kind & NUMBER, material, t_min, frame, wo)
+    way = way8(integrator, world, own, event)
+    next = sample_of_kinds(kinds_of(world), here, way)
+    onward = go_on8(integrator, next, way, paths.beta, going, event)
     on = onward.on
 
     # Look for lights.
     count = i64_at(integrator, LIGHT_SAMPLES) if event == 0 else 1
     for k in range(count if light_count(world) > 0 else 0):
-        lit = light8(world, here, one_of8(own, k, count), going)
+        lamp = lamp8(world, here, one_of8(own, k, count), going)
+        lit = lit_by8(here, lamp, bsdf_of_kinds(kinds_of(world), here, into8(frame, lamp.sample.direction)), going)
         asked = count_bits(movemask8(lit.asked))
         if asked > 0:
-            target = gather8i(table_at(pieces, LIGHTS), lit.number)
-            reach = lit.distance - t_min
-            shade = blocked8(pieces, spot.p, lit.direction, reach, piece, target)
-            bright = lit.asked & not8(surely_blocked(world, here, lit, shade, reach))
+            target = gather8i(table_at(pieces, LIGHTS), lamp.number)
+            reach = lamp.sample.distance - t_min
+            shade = blocked8(pieces, spot.p, lamp.sample.direction, reach, piece, target)
+            bright = lit.asked & not8(surely_blocked(world, here, lit, lamp.sample.direction, shade, reach))
             brought = limited8(integrator, paths.beta * lit.light, event + 1) * (1.0 / count)
             color = select8v(bright, color + brought, color)
             rays += asked
@@ -191,14 +198,14 @@ def surely_met(world: Table, pieces: Table, met: Met8, paths: Paths8, chosen: Ma
 
 
 @kernel
-def surely_blocked(world: Table, here: Surface8, lit: Lit8, shade: Shade8, reach: F64x8) -> Mask8:
+def surely_blocked(world: Table, here: Surface8, lit: Lit8, d: Vec3x8, shade: Shade8, reach: F64x8) -> Mask8:
     """Which shadow rays are blocked: those of which the filter is not sure, exactly."""
     bits = movemask8(shade.unsure & lit.asked)
     if bits == 0:
         return shade.blocked
     words = scratch(64)
     store8v(words, 0, here.p)
-    store8v(words, 24, lit.direction)
+    store8v(words, 24, d)
     store8d(words, 48, here.t_min)
     store8d(words, 56, reach)
     found = 0

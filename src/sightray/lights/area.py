@@ -12,8 +12,10 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, color, derived_vector, flag, integer
-from sightray.lights.base import WHOLE, LightSample, cells
+from sightray.lights.base import WHOLE, LightSample, LightSample8, cells
 from sightray.lights.lit import _Lit
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import Vec3x8, abs8d, dot8, select8d, select8v, splat8d, splat8v, sqrt8d, vmax8d
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey
@@ -67,6 +69,23 @@ def from_piece(light: Table, p: Vec3, q: Vec3, normal: Vec3, area: f64, parts: i
     seen = max(cosine, 0.0) * area / r2  # solid angle of the light, if all of it were like this
     density = 1.0 / seen if seen > 0.0 and i64_at(light, VISIBLE) != 0 else 0.0
     return LightSample(to_light, r, vec3_at(light, RADIANCE) * (seen / parts), density)
+
+
+@kernel
+def from_pieces8(light: Table, to_light: Vec3x8, normal: Vec3, area: f64, two_sided: bool) -> LightSample8:
+    """`from_piece`, by the whole light, for eight ways from a point to one of the light's."""
+    r2, facing = dot8(to_light, to_light), splat8v(normal)
+    apart = r2 > 0.0
+    r = sqrt8d(r2)
+    way = select8v(apart, to_light * (1.0 / r), -facing)
+    cosine = -dot8(way, facing)
+    if two_sided:
+        cosine = abs8d(cosine)
+    lit = (cosine > 0.0) & apart
+    seen = vmax8d(cosine, splat8d(0.0)) * area / r2
+    shown = 1.0 if i64_at(light, VISIBLE) != 0 else 0.0
+    irradiance = select8v(lit, splat8v(vec3_at(light, RADIANCE)) * seen, grey8(0.0))
+    return LightSample8(way, r, irradiance, select8d(lit, shown / seen, splat8d(0.0)))
 
 
 @kernel

@@ -172,6 +172,40 @@ def illuminate_one_by_one(light: Table, p: Vec3x8, u: F64x8, v: F64x8, known: Li
     return LightSample8(load8v(words, 40), load8d(words, 88), load8v(words, 64), load8d(words, 96))
 
 
+@method(7, form_of=(sky,))
+def sky_eight(light: Table, d: Vec3x8) -> Vec3x8:
+    """`sky` for eight rays."""
+    raise NotImplementedError
+
+
+@method(8, form_of=(direction_density,))
+def density_eight(light: Table, p: Vec3x8, l: Vec3x8, distance: F64x8) -> F64x8:  # noqa: E741
+    """`direction_density` for eight points."""
+    raise NotImplementedError
+
+
+@implements(sky_eight, Light)
+def skies_one_by_one(light: Table, d: Vec3x8) -> Vec3x8:
+    words = scratch(48)
+    store8v(words, 0, d)
+    for k in range(8):
+        put_lane(words, 24 + k, sky(light, lane_at(words, k)))
+    return load8v(words, 24)
+
+
+@implements(density_eight, Light)
+def densities_one_by_one(light: Table, p: Vec3x8, l: Vec3x8, distance: F64x8) -> F64x8:  # noqa: E741
+    words = scratch(56)
+    store8v(words, 0, p)
+    store8v(words, 24, l)
+    store8d(words, 48, distance)
+    for k in range(8):
+        f64_put(
+            words, 48 + k, direction_density(light, lane_at(words, k), lane_at(words, 24 + k), f64_at(words, 48 + k))
+        )
+    return load8d(words, 48)
+
+
 @implements(in_lanes, Light)
 def up_sampled(light: Table, bands: Table, rgb: Vec3) -> Vec3:
     return as_light(bands, rgb)

@@ -9,9 +9,19 @@ import numpy as np
 
 from sightray._jit import implements
 from sightray.fields import Point, derived_vector, flag, number, vector
-from sightray.lights.area import GRID, _AreaLight, cut, flat_density, from_piece, place_in_cells
-from sightray.lights.base import LightBounds, LightSample, direction_density, flat, illuminate
+from sightray.lights.area import GRID, _AreaLight, cut, flat_density, from_piece, from_pieces8, place_in_cells
+from sightray.lights.base import (
+    LightBounds,
+    LightSample,
+    LightSample8,
+    direction_density,
+    flat,
+    illuminate,
+    illuminate_eight,
+)
 from sightray.mathlib.axes import axes_across
+from sightray.mathlib.eight_paths import concentric8
+from sightray.mathlib.eights import F64x8, Vec3x8, splat8v
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
 from sightray.mathlib.vec import Vec3
@@ -73,6 +83,15 @@ def illuminate_from_disk(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> Li
     q = vec3_at(light, CENTER) + vec3_at(light, ACROSS) * s.x + vec3_at(light, ALONG) * s.y
     area, both = math.pi * radius * radius, i64_at(light, TWO_SIDED) != 0
     return from_piece(light, p, q, vec3_at(light, NORMAL), area, n * n, both)
+
+
+@implements(illuminate_eight, DiskLight)
+def illuminate_eight_from_disk(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
+    x, y = concentric8(u, v)
+    across, along = splat8v(vec3_at(light, ACROSS)), splat8v(vec3_at(light, ALONG))
+    to_light = splat8v(vec3_at(light, CENTER)) - p + across * x + along * y
+    area = math.pi * f64_at(light, RADIUS) * f64_at(light, RADIUS)
+    return from_pieces8(light, to_light, vec3_at(light, NORMAL), area, i64_at(light, TWO_SIDED) != 0)
 
 
 @implements(direction_density, DiskLight)

@@ -11,10 +11,38 @@ from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Color, color, derived_array, derived_integer, derived_vector, integer, other
 from sightray.lights.area import MAX_GRID, cut, place_in_cells
-from sightray.lights.base import LightSample, cells, direction_density, illuminate, sky
+from sightray.lights.base import (
+    LightSample,
+    LightSample8,
+    cells,
+    density_eight,
+    direction_density,
+    illuminate,
+    illuminate_eight,
+    sky,
+    sky_eight,
+)
 from sightray.lights.lit import _Lit
-from sightray.lights.picture import LUMINANCE, picture, pixel_at, radiant_pixels
-from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
+from sightray.lights.picture import LUMINANCE, picture, pixel8_at, pixel_at, radiant_pixels
+from sightray.mathlib.distribution import cell_probability, cell_probability8, cumulated, draw_cell, draw_cell8
+from sightray.mathlib.eight_functions import atan2_8, circle8
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import (
+    F64x8,
+    Vec3x8,
+    dot8,
+    floor8d,
+    floor8i,
+    gather8d,
+    select8d,
+    select8v,
+    splat8d,
+    splat8v,
+    sqrt8d,
+    vmax8d,
+    vmin8d,
+    whole8d,
+)
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.transform import Transform, as_transform
@@ -194,4 +222,99 @@ def density_of_environment(light: Table, p: Vec3, l: Vec3, distance: f64) -> f64
     d = into_picture(light, l)
     w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
     row, column = min(int(row_of(d, h)), h - 1), min(int(column_of(d, w)), w - 1)
-    return cell_probability(table_at(light, SUMS), w, h, row, column) / solid_angle_of(row, w, h)
+    edges = table_at(light, EDGES)
+    solid_angle = 2.0 * math.pi / w * (f64_at(edges, row) - f64_at(edges, row + 1))
+    return cell_probability(table_at(light, SUMS), w, h, row, column) / solid_angle
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+@kernel
+def into_picture8(light: Table, d: Vec3x8) -> Vec3x8:
+    """`into_picture` for eight directions."""
+    return splat8v(vec3_at(light, X)) * d.x + splat8v(vec3_at(light, Y)) * d.y + splat8v(vec3_at(light, Z)) * d.z
+
+
+@kernel
+def out_of_picture8(light: Table, d: Vec3x8) -> Vec3x8:
+    """`out_of_picture` for eight directions."""
+    x, y, z = splat8v(vec3_at(light, X)), splat8v(vec3_at(light, Y)), splat8v(vec3_at(light, Z))
+    return Vec3x8(dot8(x, d), dot8(y, d), dot8(z, d))
+
+
+@kernel
+def column8_of(d: Vec3x8, w: i64) -> F64x8:
+    """`column_of` for eight directions."""
+    return w * (0.5 + atan2_8(d.x, -d.z) * (0.5 / math.pi))
+
+
+@kernel
+def row8_of(d: Vec3x8, h: i64) -> F64x8:
+    """`row_of` for eight directions."""
+    return atan2_8(sqrt8d(d.x * d.x + d.z * d.z), d.y) * (h / math.pi)
+
+
+@kernel
+def between_pixels8(light: Table, along: F64x8, down: F64x8) -> Vec3x8:
+    """`between_pixels` for eight places."""
+    w, h, pixels = i64_at(light, WIDTH), i64_at(light, HEIGHT), table_at(light, PIXELS)
+    x, y, zero, last = along - 0.5, down - 0.5, splat8d(0.0), splat8d(h - 1.0)
+    left, top = floor8d(x), floor8d(y)
+    s, t = x - left, y - top
+    left = vmin8d(select8d(left < 0.0, splat8d(w - 1.0), left), splat8d(w - 1.0))  # also where there is no direction
+    right = select8d(left + 1.0 >= float(w), zero, left + 1.0)
+    column, following = floor8i(left), floor8i(right)
+    row, below = floor8i(vmin8d(vmax8d(top, zero), last)), floor8i(vmin8d(vmax8d(top + 1.0, zero), last))
+    upper = pixel8_at(pixels, w, column, row) * (1.0 - s) + pixel8_at(pixels, w, following, row) * s
+    lower = pixel8_at(pixels, w, column, below) * (1.0 - s) + pixel8_at(pixels, w, following, below) * s
+    return splat8v(vec3_at(light, RADIANCE)) * (upper * (1.0 - t) + lower * t)
+
+
+@implements(sky_eight, EnvironmentLight)
+def sky_of_environment_eight(light: Table, d: Vec3x8) -> Vec3x8:
+    w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
+    if w * h == 1:
+        return splat8v(vec3_at(light, RADIANCE) * pixel_at(table_at(light, PIXELS), 1, 0, 0))
+    found = into_picture8(light, d)
+    return between_pixels8(light, column8_of(found, w), row8_of(found, h))
+
+
+@implements(illuminate_eight, EnvironmentLight)
+def illuminate_eight_from_environment(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
+    w, h, edges = i64_at(light, WIDTH), i64_at(light, HEIGHT), table_at(light, EDGES)
+    drawn = draw_cell8(table_at(light, SUMS), w, h, u, v)
+    upper, lower = gather8d(edges, drawn.row), gather8d(edges, drawn.row + 1)
+    cosine = upper + (lower - upper) * drawn.v
+    sine = sqrt8d(vmax8d(splat8d(0.0), 1.0 - cosine * cosine))
+    column = whole8d(drawn.column) + drawn.u
+    x, y = circle8(column * (1.0 / w) - 0.5)
+    d = Vec3x8(sine * y, cosine, -(sine * x))
+    density = drawn.probability / ((upper - lower) * (2.0 * math.pi / w))
+    light_of = sky_between(light, column, d)
+    there = drawn.probability > 0.0
+    irradiance = select8v(there, light_of * (1.0 / density), grey8(0.0))
+    return LightSample8(
+        out_of_picture8(light, d), splat8d(math.inf), irradiance, select8d(there, density, splat8d(0.0))
+    )
+
+
+@kernel
+def sky_between(light: Table, column: F64x8, d: Vec3x8) -> Vec3x8:
+    """Radiance from directions of the picture whose columns are known."""
+    w, h = i64_at(light, WIDTH), i64_at(light, HEIGHT)
+    if w * h == 1:
+        return splat8v(vec3_at(light, RADIANCE) * pixel_at(table_at(light, PIXELS), 1, 0, 0))
+    return between_pixels8(light, column, row8_of(d, h))
+
+
+@implements(density_eight, EnvironmentLight)
+def density_eight_of_environment(light: Table, p: Vec3x8, l: Vec3x8, distance: F64x8) -> F64x8:  # noqa: E741
+    w, h, edges = i64_at(light, WIDTH), i64_at(light, HEIGHT), table_at(light, EDGES)
+    if w * h == 1:
+        return splat8d(0.25 / math.pi)
+    d = into_picture8(light, l)
+    row = floor8i(vmin8d(row8_of(d, h), splat8d(h - 1.0)))
+    column = floor8i(vmin8d(column8_of(d, w), splat8d(w - 1.0)))
+    solid_angle = (gather8d(edges, row) - gather8d(edges, row + 1)) * (2.0 * math.pi / w)
+    return cell_probability8(table_at(light, SUMS), w, h, row, column) * (1.0 / solid_angle)

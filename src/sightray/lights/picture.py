@@ -11,6 +11,7 @@ import numpy as np
 from sightray._jit import kernel
 from sightray.errors import SceneError
 from sightray.fields import REQUIRED, other
+from sightray.mathlib.eights import I64x8, Vec3x8, gather8f
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f32_at
 from sightray.mathlib.vec import Vec3
@@ -66,3 +67,10 @@ def pixel_at(pixels: Table, w: i64, column: i64, row: i64) -> Vec3:
     """Colour of a pixel of a picture w pixels wide; row 0 is on top."""
     at = 3 * (row * w + column)
     return Vec3(float(f32_at(pixels, at)), float(f32_at(pixels, at + 1)), float(f32_at(pixels, at + 2)), 0.0)
+
+
+@kernel
+def pixel8_at(pixels: Table, w: i64, column: I64x8, row: I64x8) -> Vec3x8:
+    """`pixel_at` for eight pixels."""
+    at = (row * w + column) * 3
+    return Vec3x8(gather8f(pixels, at), gather8f(pixels, at + 1), gather8f(pixels, at + 2))

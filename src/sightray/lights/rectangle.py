@@ -9,7 +9,17 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Point, derived_integer, derived_number, derived_vector, flag, vector
-from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, cut, flat_density, from_piece, place_in_cells
+from sightray.lights.area import (
+    GRID,
+    RADIANCE,
+    VISIBLE,
+    _AreaLight,
+    cut,
+    flat_density,
+    from_piece,
+    from_pieces8,
+    place_in_cells,
+)
 from sightray.lights.base import (
     LightBounds,
     LightPolygon,
@@ -23,19 +33,7 @@ from sightray.lights.base import (
     polygon,
 )
 from sightray.lights.window import NEAR, Window, in_window, window_of
-from sightray.mathlib.eight_paths import grey8
-from sightray.mathlib.eights import (
-    F64x8,
-    Vec3x8,
-    abs8d,
-    dot8,
-    select8d,
-    select8v,
-    splat8d,
-    splat8v,
-    sqrt8d,
-    vmax8d,
-)
+from sightray.mathlib.eights import F64x8, Vec3x8, dot8, splat8d, splat8v
 from sightray.mathlib.lanes import movemask8
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
@@ -128,21 +126,11 @@ def illuminate_from_rectangle(light: Table, p: Vec3, cell: i64, u: f64, v: f64) 
 
 @implements(illuminate_eight, RectangleLight)
 def illuminate_eight_from_rectangle(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
-    area, normal = f64_at(light, AREA), splat8v(vec3_at(light, NORMAL))
+    area = f64_at(light, AREA)
     edge_u, edge_v = splat8v(vec3_at(light, EDGE_U)), splat8v(vec3_at(light, EDGE_V))
     to_corner = splat8v(vec3_at(light, CORNER)) - p
     to_light = to_corner + edge_u * u + edge_v * v
-    r2 = dot8(to_light, to_light)
-    r = sqrt8d(r2)
-    way = to_light * (1.0 / r)
-    cosine = -dot8(way, normal)
-    if i64_at(light, TWO_SIDED) != 0:
-        cosine = abs8d(cosine)
-    lit = (cosine > 0.0) & (r2 > 0.0)
-    seen = vmax8d(cosine, splat8d(0.0)) * area / r2  # as in `from_piece`
-    shown = 1.0 if i64_at(light, VISIBLE) != 0 else 0.0
-    irradiance = select8v(lit, splat8v(vec3_at(light, RADIANCE)) * seen, grey8(0.0))
-    found = LightSample8(way, r, irradiance, select8d(lit, shown / seen, splat8d(0.0)))
+    found = from_pieces8(light, to_light, vec3_at(light, NORMAL), area, i64_at(light, TWO_SIDED) != 0)
     to_middle = to_corner + (edge_u + edge_v) * 0.5
     near = movemask8(dot8(to_middle, to_middle) * NEAR <= splat8d(area))
     if i64_at(light, UPRIGHT) == 0 or near == 0:

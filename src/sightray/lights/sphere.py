@@ -10,7 +10,28 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.fields import Point, number, vector
 from sightray.lights.area import GRID, RADIANCE, VISIBLE, _AreaLight, cut, place_in_cells
-from sightray.lights.base import LightBounds, LightSample, around, direction_density, illuminate
+from sightray.lights.base import (
+    LightBounds,
+    LightSample,
+    LightSample8,
+    around,
+    direction_density,
+    illuminate,
+    illuminate_eight,
+)
+from sightray.mathlib.eight_functions import circle8
+from sightray.mathlib.eight_paths import frame_about8, out_of8
+from sightray.mathlib.eights import (
+    F64x8,
+    Vec3x8,
+    dot8,
+    select8d,
+    select8v,
+    splat8d,
+    splat8v,
+    sqrt8d,
+    vmax8d,
+)
 from sightray.mathlib.frame import perpendicular
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
@@ -116,6 +137,35 @@ def illuminate_from_sphere(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> 
     density = 1.0 / way.solid_angle if way.solid_angle > 0.0 and i64_at(light, VISIBLE) != 0 else 0.0
     irradiance = vec3_at(light, RADIANCE) * (way.solid_angle / (n * n))
     return LightSample(way.direction, way.distance, irradiance, density)
+
+
+@kernel
+def in_cone8(axis: Vec3x8, cap: F64x8, u: F64x8, v: F64x8) -> Vec3x8:
+    """`in_cone` for eight directions."""
+    height = u * cap
+    sine = sqrt8d(vmax8d(splat8d(0.0), height * (2.0 - height)))
+    x, y = circle8(v)
+    return out_of8(frame_about8(axis), Vec3x8(sine * x, sine * y, 1.0 - height))
+
+
+@implements(illuminate_eight, SphereLight)
+def illuminate_eight_from_sphere(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
+    to_center, radius, zero = splat8v(vec3_at(light, CENTER)) - p, f64_at(light, RADIUS), splat8d(0.0)
+    d = sqrt8d(dot8(to_center, to_center))
+    outside = d > radius * (1.0 + 1e-7)  # as in `is_outside`
+    sin2 = (radius / d) * (radius / d)
+    cap = sin2 / (1.0 + sqrt8d(vmax8d(zero, 1.0 - sin2)))
+    direction, height = in_cone8(to_center * (1.0 / d), cap, u, v), u * cap
+    foot2 = radius * radius - d * d * height * (2.0 - height)
+    distance = d * (1.0 - height) - sqrt8d(vmax8d(zero, foot2))
+    solid_angle = select8d(outside, cap * (2.0 * math.pi), zero)
+    shown = 1.0 if i64_at(light, VISIBLE) != 0 else 0.0
+    return LightSample8(
+        select8v(outside, direction, Vec3x8(zero, splat8d(1.0), zero)),
+        select8d(outside, distance, splat8d(radius)),
+        splat8v(vec3_at(light, RADIANCE)) * solid_angle,
+        select8d(outside, shown / solid_angle, zero),
+    )
 
 
 @implements(direction_density, SphereLight)

@@ -10,9 +10,11 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import Color, Point, color, derived_number, derived_vector, number, vector
-from sightray.lights.base import LightBounds, LightSample, illuminate
+from sightray.lights.base import LightBounds, LightSample, LightSample8, illuminate, illuminate_eight
 from sightray.lights.lit import _Lit
 from sightray.mathlib.axes import unit
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import F64x8, Vec3x8, dot8, select8d, select8v, splat8d, splat8v, sqrt8d
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, length
@@ -86,3 +88,18 @@ def illuminate_from_spot(light: Table, p: Vec3, cell: i64, u: f64, v: f64) -> Li
     c = vec3_at(light, ATTENUATION)
     share = falloff(-dot(to_light, axis), f64_at(light, COS_OUTER), f64_at(light, COS_INNER))
     return LightSample(to_light, r, vec3_at(light, INTENSITY) * (share / (c.x + c.y * r + c.z * r * r)), 0.0)
+
+
+@implements(illuminate_eight, SpotLight)
+def illuminate_eight_from_spot(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
+    to_light, axis = splat8v(vec3_at(light, POSITION)) - p, splat8v(vec3_at(light, AXIS))
+    c, outer, inner = vec3_at(light, ATTENUATION), f64_at(light, COS_OUTER), f64_at(light, COS_INNER)
+    r2 = dot8(to_light, to_light)
+    r, apart = sqrt8d(r2), r2 > 0.0
+    way = select8v(apart, to_light * (1.0 / r), -axis)
+    cosine = -dot8(way, axis)
+    t = (cosine - outer) * (1.0 / (inner - outer))
+    share = select8d(cosine > outer, t * t * (3.0 - 2.0 * t), splat8d(0.0))
+    share = select8d(cosine >= inner, splat8d(1.0), share) / (c.x + c.y * r + c.z * r2)
+    light_of = select8v(apart, splat8v(vec3_at(light, INTENSITY)) * share, grey8(0.0))
+    return LightSample8(way, r, light_of, splat8d(0.0))

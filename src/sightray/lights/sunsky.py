@@ -23,7 +23,19 @@ from sightray.fields import (
     vector,
 )
 from sightray.lights.area import MAX_GRID, cut, place_in_cells
-from sightray.lights.base import Light, LightSample, cells, direction_density, illuminate, in_lanes, sky
+from sightray.lights.base import (
+    Light,
+    LightSample,
+    LightSample8,
+    cells,
+    density_eight,
+    direction_density,
+    illuminate,
+    illuminate_eight,
+    in_lanes,
+    sky,
+    sky_eight,
+)
 from sightray.lights.daylight import (
     SUN_RADIUS,
     Perez,
@@ -34,12 +46,38 @@ from sightray.lights.daylight import (
     sun_brightness,
 )
 from sightray.lights.daylight import sun_direction as sun_at
-from sightray.lights.environment import column_of, row_of, solid_angle_of
+from sightray.lights.environment import column8_of, column_of, row8_of, row_of, solid_angle_of
 from sightray.lights.picture import LUMINANCE
-from sightray.lights.sphere import in_cone
+from sightray.lights.sphere import in_cone, in_cone8
 from sightray.materials.by_wavelength import at_bands
 from sightray.mathlib.axes import unit
-from sightray.mathlib.distribution import cell_probability, cumulated, draw_cell
+from sightray.mathlib.distribution import (
+    BELOW_ONE,
+    cell_probability,
+    cell_probability8,
+    cumulated,
+    draw_cell,
+    draw_cell8,
+)
+from sightray.mathlib.eight_functions import atan2_8, circle8, exp8
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    dot8,
+    floor8i,
+    not8,
+    select8d,
+    select8v,
+    splat8d,
+    splat8v,
+    sqrt8d,
+    vmax8d,
+    vmin8d,
+    whole8d,
+)
+from sightray.mathlib.lanes import Mask8, movemask8
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, vexp, vmax
@@ -257,3 +295,87 @@ def illuminate_from_sun_and_sky(light: Table, p: Vec3, cell: i64, u: f64, v: f64
     if not density > 0.0:
         return LightSample(d, math.inf, grey(0.0), 0.0)
     return LightSample(d, math.inf, sky_of_sun_and_sky(light, d) / (density * (n * n)), density)
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+@kernel
+def radiance8_from(light: Table, d: Vec3x8) -> Vec3x8:
+    """`radiance_from` for eight directions."""
+    above, zero = d.y > 0.0, splat8d(0.0)
+    below = splat8v(vec3_at(light, BELOW))
+    if movemask8(above) == 0:
+        return below
+    cosine = vmin8d(splat8d(1.0), vmax8d(splat8d(-1.0), dot8(d, splat8v(vec3_at(light, TO_SUN)))))
+    gamma = atan2_8(sqrt8d((1.0 - cosine) * (1.0 + cosine)), cosine)
+    a, b, c = vec3_at(light, A), vec3_at(light, B), vec3_at(light, C)
+    e, f, zenith = vec3_at(light, D), vec3_at(light, E), vec3_at(light, ZENITH)
+    flat, cos2 = 1.0 / d.y, cosine * cosine
+    luminance = perez8(zenith.x, a.x, b.x, c.x, e.x, f.x, flat, gamma, cos2)
+    x = perez8(zenith.y, a.y, b.y, c.y, e.y, f.y, flat, gamma, cos2)
+    y = perez8(zenith.z, a.z, b.z, c.z, e.z, f.z, flat, gamma, cos2)
+    xyz = Vec3x8(x / y * luminance, luminance, (1.0 - x - y) / y * luminance)
+    red, green, blue = splat8v(vec3_at(light, RED)), splat8v(vec3_at(light, GREEN)), splat8v(vec3_at(light, BLUE))
+    rgb = Vec3x8(vmax8d(dot8(red, xyz), zero), vmax8d(dot8(green, xyz), zero), vmax8d(dot8(blue, xyz), zero))
+    return select8v(above, rgb, below)
+
+
+@kernel
+def perez8(
+    zenith: f64, a: f64, b: f64, c: f64, d: f64, e: f64, flat: F64x8, gamma: F64x8, cos2: F64x8
+) -> F64x8:  # fmt: skip
+    """Perez's formula, at an angle from the sun; `flat` is 1 over the cosine of the angle from the zenith."""
+    return zenith * (1.0 + a * exp8(b * flat)) * (1.0 + c * exp8(d * gamma) + e * cos2)
+
+
+@kernel
+def in_sun8(light: Table, d: Vec3x8) -> Mask8:
+    """`in_sun` for eight directions."""
+    return 1.0 - dot8(d, splat8v(vec3_at(light, TO_SUN))) < f64_at(light, CAP)
+
+
+@implements(sky_eight, SunSky)
+def sky_of_sun_and_sky_eight(light: Table, d: Vec3x8) -> Vec3x8:
+    rest = radiance8_from(light, d)
+    return select8v(in_sun8(light, d), rest + splat8v(vec3_at(light, SUN)), rest)
+
+
+@kernel
+def edges8(row: I64x8) -> tuple[F64x8, F64x8]:
+    """Cosines of the angles from +y of the upper and lower edges of rows."""
+    upper, _ = circle8(whole8d(row) * (0.5 / H))
+    lower, _ = circle8(whole8d(row + 1) * (0.5 / H))
+    return upper, lower
+
+
+@implements(density_eight, SunSky)
+def density_eight_of_sun_and_sky(light: Table, p: Vec3x8, l: Vec3x8, distance: F64x8) -> F64x8:  # noqa: E741
+    share = f64_at(light, SUN_SHARE)
+    row = floor8i(vmin8d(row8_of(l, H), splat8d(H - 1.0)))
+    column = floor8i(vmin8d(column8_of(l, W), splat8d(W - 1.0)))
+    upper, lower = edges8(row)
+    chance = cell_probability8(table_at(light, SUMS), W, H, row, column)
+    density = chance * (1.0 - share) / ((upper - lower) * (2.0 * math.pi / W))
+    in_disc = density + share / (2.0 * math.pi * f64_at(light, CAP))
+    return select8d(in_sun8(light, l), in_disc, density)
+
+
+@implements(illuminate_eight, SunSky)
+def illuminate_eight_from_sun_and_sky(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
+    share, d = f64_at(light, SUN_SHARE), grey8(0.0)
+    to_sun = u < share
+    if movemask8(to_sun) != 0:
+        axis, cap = splat8v(vec3_at(light, TO_SUN)), splat8d(f64_at(light, CAP))
+        d = in_cone8(axis, cap, u * (1.0 / share), v)
+    if movemask8(not8(to_sun)) != 0:
+        rest = vmin8d((u - share) / splat8d(1.0 - share), splat8d(BELOW_ONE))
+        drawn = draw_cell8(table_at(light, SUMS), W, H, rest, v)
+        upper, lower = edges8(drawn.row)
+        cosine = upper + (lower - upper) * drawn.v
+        sine = sqrt8d(vmax8d(splat8d(0.0), 1.0 - cosine * cosine))
+        x, y = circle8((whole8d(drawn.column) + drawn.u) * (1.0 / W) - 0.5)
+        d = select8v(to_sun, d, Vec3x8(sine * y, cosine, -(sine * x)))
+    density = density_eight_of_sun_and_sky(light, p, d, splat8d(math.inf))
+    irradiance = sky_of_sun_and_sky_eight(light, d) * (1.0 / density)
+    return LightSample8(d, splat8d(math.inf), select8v(density > 0.0, irradiance, grey8(0.0)), density)

@@ -10,13 +10,28 @@ import numpy as np
 from sightray._jit import implements, kernel
 from sightray.errors import SceneError
 from sightray.fields import choice, derived_array, derived_vector, number, other
-from sightray.materials.base import BsdfSample, BsdfValue, Local, Material, bsdf, local, sample_bsdf
+from sightray.materials.base import (
+    BsdfSample,
+    BsdfValue,
+    Local,
+    Material,
+    Sample8,
+    Value8,
+    bsdf,
+    bsdf_eight,
+    local,
+    sample_bsdf,
+    sample_eight,
+)  # fmt: skip
 from sightray.materials.by_wavelength import at_bands
-from sightray.materials.data import data, share_of
-from sightray.materials.energy import missing_of_mirrors
+from sightray.materials.data import data, share8_of, share_of
+from sightray.materials.eight_facets import Facets8, facets8, facing8, sample_facet8, upward8
+from sightray.materials.eight_missing import mean_share8, sample_spread8, share_at8, spread_density8, tables8
+from sightray.materials.energy import SMOOTH, missing_of_mirrors
 from sightray.materials.gloss import glossy, softened
-from sightray.materials.metal import fresnel_lanes, mean_reflectance
+from sightray.materials.metal import fresnel_colours8, fresnel_lanes, mean_reflectance
 from sightray.materials.microfacet import (
+    BECKMANN,
     DISTRIBUTIONS,
     Facets,
     facet_density,
@@ -29,6 +44,22 @@ from sightray.materials.microfacet import (
 )
 from sightray.materials.missing import mean_share, sample_spread, share_at, spread_density
 from sightray.mathlib.bands import as_reflectance
+from sightray.mathlib.eight_paths import gather8v, grey8, plus8, quotient8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    abs8d,
+    dot8,
+    gather8d,
+    gather8i,
+    not8,
+    select8d,
+    select8v,
+    sign8d,
+    splat8d,
+)
+from sightray.mathlib.lanes import movemask8
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, normalize
@@ -201,3 +232,73 @@ def local_of_conductor(material: Table, where: Where, cos_view: f64) -> Local:
     seen = reflectance(material, where.bands, softened(cos_view, alpha))
     color = reflectance(material, where.bands, 1.0)
     return glossy(color, zero, zero, seen, zero, alpha, 1.0, zero)
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+@kernel
+def reflectance8(material: Table, rows: I64x8, cosine: F64x8) -> Vec3x8:
+    """`reflectance` for eight paths."""
+    return fresnel_colours8(cosine, gather8v(material, rows + N), gather8v(material, rows + K))
+
+
+@kernel
+def facets8_of(material: Table, rows: I64x8, roughness: F64x8) -> Facets8:
+    """`facets_of` for eight paths."""
+    beckmann = movemask8(gather8i(material, rows + DISTRIBUTION) == BECKMANN)
+    return facets8(beckmann, roughness, gather8d(material, rows + ANISOTROPY))
+
+
+@kernel
+def reflected8(
+    material: Table, rows: I64x8, roughness: F64x8, shape: Facets8, lost: F64x8, o: Vec3x8, i: Vec3x8
+) -> Value8:
+    """`bsdf` of rough metal, between directions above it."""
+    facing, table = facing8(shape, o, i), tables8(material, rows, MISSING)
+    mean, f = mean_share8(material, table, roughness), gather8v(material, rows + MEAN)
+    colour = quotient8(f * f * (1.0 - mean), plus8(-(f * mean), splat8d(1.0)))
+    spread = lost * share_at8(material, table, roughness, i) * i.z / (mean * math.pi)
+    once = reflectance8(material, rows, facing.cosine) * facing.once
+    value = select8v(mean > 0.0, once + colour * spread, once)
+    return Value8(value, (1.0 - lost) * facing.density + lost * spread_density8(roughness, i.z))
+
+
+@implements(sample_eight, Conductor)
+def sample_conductor_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
+    roughness, mirrored = share8_of(material, rows, ROUGHNESS), Vec3x8(-wo.x, -wo.y, wo.z)
+    smooth = roughness * roughness <= SMOOTH
+    found = Sample8(mirrored, grey8(0.0), splat8d(0.0))
+    if movemask8(smooth) != 0:
+        found = Sample8(mirrored, reflectance8(material, rows, abs8d(wo.z)), splat8d(0.0))
+    if movemask8(not8(smooth)) == 0:
+        return found
+
+    # Reflect once, or as often as light does that single reflections lose.
+    o, shape = upward8(wo), facets8_of(material, rows, roughness)
+    lost = share_at8(material, tables8(material, rows, MISSING), roughness, o)
+    many = choice < lost
+    m = sample_facet8(shape, o, u, v)
+    i = m * (2.0 * dot8(o, m)) - o
+    if movemask8(many) != 0:
+        i = select8v(many, sample_spread8(roughness, u, v, smooth), i)
+    answer = reflected8(material, rows, roughness, shape, lost, o, i)
+    possible = (i.z > 0.0) & (answer.density > 0.0)
+    wi = select8v(possible, Vec3x8(i.x, i.y, i.z * sign8d(wo.z)), wo)
+    weight = select8v(possible, answer.value * (1.0 / answer.density), grey8(0.0))
+    density = select8d(possible, answer.density, splat8d(0.0))
+    return Sample8(
+        select8v(smooth, found.wi, wi), select8v(smooth, found.weight, weight), select8d(smooth, found.density, density)
+    )  # fmt: skip
+
+
+@implements(bsdf_eight, Conductor)
+def bsdf_of_conductor_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    roughness = share8_of(material, rows, ROUGHNESS)
+    there, none = (wo.z * wi.z > 0.0) & (roughness * roughness > SMOOTH), Value8(grey8(0.0), splat8d(0.0))
+    if movemask8(there) == 0:
+        return none
+    o, shape = upward8(wo), facets8_of(material, rows, roughness)
+    lost = share_at8(material, tables8(material, rows, MISSING), roughness, o)
+    found = reflected8(material, rows, roughness, shape, lost, o, upward8(wi))
+    return Value8(select8v(there, found.value, none.value), select8d(there, found.density, none.density))

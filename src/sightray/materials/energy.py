@@ -54,7 +54,9 @@ def reflected_by_glass(kind: int, eta: float, anisotropy: float = 0.0) -> Array:
         [1.0 - _row(kind, anisotropy, c, r, lambda f: f.share(eta) * f.reflected) for r in range(ROUGHNESSES)]
         for c in _azimuths(anisotropy)
     ]
-    return with_means(np.array(rows) / smooth, lambda cosine: fresnel_share(cosine, eta))
+    shares = np.array(rows)
+    ratios = np.divide(shares, smooth, out=np.ones_like(shares), where=smooth > 0.0)  # an index of 1 reflects nothing
+    return with_means(ratios, lambda cosine: fresnel_share(cosine, eta))
 
 
 class _Facets:

@@ -123,11 +123,16 @@ def shares_of_lanes(ior: Vec3, cosine: f64, outside: bool) -> Vec3:
 
 @implements(sample_eight, Glass)
 def sample_glass_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
-    ior = gather8d(material, rows + IOR)
+    return sample_smooth8(gather8d(material, rows + IOR), gather8v(material, rows + TINT), wo, choice)
+
+
+@kernel
+def sample_smooth8(ior: F64x8, tint: Vec3x8, wo: Vec3x8, choice: F64x8) -> Sample8:
+    """`sample_smooth` for eight paths."""
     eta = select8d(wo.z > 0.0, 1.0 / ior, ior)
     mirrored = choice < fresnel8(abs8d(wo.z), eta)
     wi = select8v(mirrored, Vec3x8(-wo.x, -wo.y, wo.z), refract8(wo, eta))
-    return Sample8(wi, select8v(mirrored, grey8(1.0), gather8v(material, rows + TINT)), splat8d(0.0))
+    return Sample8(wi, select8v(mirrored, grey8(1.0), tint), splat8d(0.0))
 
 
 @implements(interior, Glass)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sightray._jit import kernel
+from sightray.mathlib.eights import F64x8, Vec3x8, select8d, splat8d, sqrt8d, vmax8d
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.vec import Vec3
 
@@ -39,6 +40,26 @@ def fresnel_lanes(cosine: f64, n: Vec3, k: Vec3) -> Vec3:
         fresnel_metal(cosine, n.x, k.x), fresnel_metal(cosine, n.y, k.y), fresnel_metal(cosine, n.z, k.z),
         fresnel_metal(cosine, n.w, k.w),
     )  # fmt: skip
+
+
+@kernel
+def fresnel_metal8(cosine: F64x8, n: F64x8, k: F64x8) -> F64x8:
+    """`fresnel_metal` for eight paths."""
+    zero, cos2 = splat8d(0.0), cosine * cosine
+    sin2 = vmax8d(zero, 1.0 - cos2)
+    difference = n * n - k * k - sin2
+    norm = sqrt8d(difference * difference + 4.0 * n * n * k * k)
+    twice = 2.0 * cosine * sqrt8d(vmax8d(zero, 0.5 * (norm + difference)))
+    r_s = (norm - twice + cos2) / (norm + twice + cos2)
+    along, bent = cos2 * norm + sin2 * sin2, twice * sin2
+    r_p = select8d(along + bent > 0.0, r_s * (along - bent) / (along + bent), r_s)
+    return 0.5 * (r_s + r_p)
+
+
+@kernel
+def fresnel_colours8(cosine: F64x8, n: Vec3x8, k: Vec3x8) -> Vec3x8:
+    """The same for red, green and blue."""
+    return Vec3x8(fresnel_metal8(cosine, n.x, k.x), fresnel_metal8(cosine, n.y, k.y), fresnel_metal8(cosine, n.z, k.z))
 
 
 def mean_reflectance(n: ArrayLike, k: ArrayLike) -> NDArray[np.float64]:

@@ -13,17 +13,38 @@ from sightray.materials.base import (
     BsdfValue,
     Local,
     Material,
+    Sample8,
+    Value8,
     bsdf,
+    bsdf_eight,
     emitted,
     local,
     sample_bsdf,
+    sample_eight,
 )  # fmt: skip
+from sightray.materials.eight_facets import upward8
 from sightray.materials.microfacet import upward
+from sightray.mathlib.eight_functions import atan2_8
+from sightray.mathlib.eight_paths import cosine_hemisphere8, grey8, plus8, quotient8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    dot8,
+    gather8d,
+    select8d,
+    select8v,
+    splat8d,
+    sqrt8d,
+    vmax8d,
+    vmin8d,
+)
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey
 from sightray.mathlib.warp import cosine_hemisphere
-from sightray.textures.base import Where, textured, value_at
+from sightray.textures.base import Where, constant8, textured, value_at
+from sightray.textures.constant import COLOR
 
 WIDEST = 2.0 / 3.0 - 28.0 / (15.0 * math.pi)  # what roughness adds to the mean reflectance
 
@@ -54,6 +75,7 @@ class OrenNayar(Material):
     improvement of Oren-Nayar reflectance model", 2012.
     """
 
+    chooses = False
     albedo: Any = textured("share of light that is reflected", default=0.5, at_most=1.0)
     sigma: float = number("standard deviation of slopes", default=20.0, unit="degrees", at_least=0, at_most=90)
     emission: Color = color("radiance that the surface gives off by itself", default=0.0, unit="W/(m² sr)")
@@ -122,3 +144,38 @@ def local_of_oren_nayar(material: Table, where: Where, cos_view: f64) -> Local:
 @implements(emitted, OrenNayar)
 def emitted_by_oren_nayar(material: Table, where: Where, cos_view: f64) -> Vec3:
     return vec3_at(material, EMISSION)
+
+
+@kernel
+def leaves_once8(r: F64x8, cosine: F64x8) -> F64x8:
+    """`leaves_once` for eight paths."""
+    c = vmin8d(splat8d(1.0), vmax8d(splat8d(0.0), cosine))
+    sine = sqrt8d(vmax8d(splat8d(0.0), 1.0 - c * c))
+    tangent_part = select8d(c > 1e-6, sine / c * (1.0 - sine * sine * sine), splat8d(0.0))
+    g = sine * (atan2_8(sine, c) - sine * c) + (tangent_part - sine) * (2.0 / 3.0)
+    return (1.0 + r * g * (1.0 / math.pi)) / (1.0 + r * (0.5 - 2.0 / (3.0 * math.pi)))
+
+
+@implements(bsdf_eight, OrenNayar)
+def bsdf_of_oren_nayar_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    r, albedo = gather8d(material, rows + R), constant8(material, rows, ALBEDO, COLOR)
+    o, i = upward8(wo), upward8(wi)
+    a = 1.0 / (1.0 + r * (0.5 - 2.0 / (3.0 * math.pi)))
+    s = dot8(o, i) - o.z * i.z
+    value = albedo * (a * (1.0 + r * select8d(s > 0.0, s / vmax8d(o.z, i.z), s)))
+    mean = a * (1.0 + r * WIDEST)
+    spread = (1.0 - leaves_once8(r, o.z)) * (1.0 - leaves_once8(r, i.z)) / (1.0 - mean)
+    many = quotient8(albedo * albedo * (mean * spread), plus8(-(albedo * (1.0 - mean)), splat8d(1.0)))
+    value = select8v(mean < 1.0, value + many, value)
+    density = select8d(wo.z * wi.z > 0.0, i.z * (1.0 / math.pi), splat8d(0.0))
+    return Value8(select8v(density > 0.0, value * density, grey8(0.0)), density)
+
+
+@implements(sample_eight, OrenNayar)
+def sample_oren_nayar_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
+    wi = cosine_hemisphere8(u, v)
+    wi = select8v(wo.z > 0.0, wi, -wi)
+    found = bsdf_of_oren_nayar_eight(material, rows, wo, wi)
+    there = found.density > 0.0
+    weight = select8v(there, found.value * (1.0 / found.density), grey8(0.0))
+    return Sample8(select8v(there, wi, wo), weight, found.density)

@@ -7,13 +7,44 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, choice, color, number
-from sightray.materials.base import BsdfSample, BsdfValue, Local, Material, bsdf, emitted, local, sample_bsdf
+from sightray.materials.base import (
+    BsdfSample,
+    BsdfValue,
+    Local,
+    Material,
+    Sample8,
+    Value8,
+    bsdf,
+    bsdf_eight,
+    emitted,
+    local,
+    sample_bsdf,
+    sample_eight,
+)
+from sightray.mathlib.eight_functions import circle8, pow8
+from sightray.mathlib.eight_paths import brightest8, cosine_hemisphere8, frame_about8, grey8, out_of8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    abs8d,
+    dot8,
+    gather8d,
+    not8,
+    select8d,
+    select8v,
+    splat8d,
+    sqrt8d,
+    vmax8d,
+)
 from sightray.mathlib.frame import perpendicular
+from sightray.mathlib.lanes import movemask8
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, cross, dot, grey, max4
 from sightray.mathlib.warp import cosine_hemisphere, power_cosine
-from sightray.textures.base import Where, textured, value_at
+from sightray.textures.base import Where, constant8, textured, value_at
+from sightray.textures.constant import COLOR
 
 HIGHLIGHTS = ("phong", "blinn")  # at the indices PHONG and BLINN of the contract, because kernels see the index
 
@@ -117,3 +148,55 @@ def sample_phong(material: Table, where: Where, wo: Vec3, u: f64, v: f64, choice
 @implements(emitted, Phong)
 def emitted_by_phong(material: Table, where: Where, cos_view: f64) -> Vec3:
     return vec3_at(material, EMISSION)
+
+
+@kernel
+def parts8(material: Table, rows: I64x8) -> Vec3x8:
+    """`parts` for eight paths."""
+    diffuse, specular, mirror = (
+        brightest8(constant8(material, rows, DIFFUSE, COLOR)),
+        brightest8(constant8(material, rows, SPECULAR, COLOR)),
+        brightest8(constant8(material, rows, MIRROR, COLOR)),
+    )
+    total = diffuse + specular + mirror
+    shares = Vec3x8(diffuse, specular, mirror) * (1.0 / total)
+    return select8v(total > 0.0, shares, Vec3x8(splat8d(1.0), splat8d(0.0), splat8d(0.0)))
+
+
+@implements(bsdf_eight, Phong)
+def bsdf_of_phong_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    n, share = gather8d(material, rows + SHININESS), parts8(material, rows)
+    along = vmax8d(splat8d(0.0), dot8(Vec3x8(-wo.x, -wo.y, wo.z), wi))
+    lobe = pow8(along, n) * (0.5 / math.pi)
+    there, cosine = wo.z * wi.z > 0.0, abs8d(wi.z)
+    f = constant8(material, rows, DIFFUSE, COLOR) * (1.0 / math.pi)
+    f = f + constant8(material, rows, SPECULAR, COLOR) * ((n + 2.0) * lobe)
+    density = share.x * cosine * (1.0 / math.pi) + share.y * (n + 1.0) * lobe
+    return Value8(select8v(there, f * cosine, grey8(0.0)), select8d(there, density, splat8d(0.0)))
+
+
+@kernel
+def highlight8(exponent: F64x8, axis: Vec3x8, u: F64x8, v: F64x8) -> Vec3x8:
+    """Directions about an axis, as `warp.power_cosine` has them about z."""
+    cosine = pow8(u, 1.0 / (exponent + 1.0))
+    sine = sqrt8d(vmax8d(splat8d(0.0), 1.0 - cosine * cosine))
+    cosine_around, sine_around = circle8(v)
+    return out_of8(frame_about8(axis), Vec3x8(sine * cosine_around, sine * sine_around, cosine))
+
+
+@implements(sample_eight, Phong)
+def sample_phong_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
+    share, mirrored = parts8(material, rows), Vec3x8(-wo.x, -wo.y, wo.z)
+    mirrors = choice < share.z
+    matte = not8(mirrors) & (choice < share.z + share.x)
+    wi = cosine_hemisphere8(u, v)
+    wi = select8v(wo.z > 0.0, wi, -wi)
+    if movemask8(mirrors | matte) != 255:
+        wi = select8v(matte, wi, highlight8(gather8d(material, rows + SHININESS), mirrored, u, v))
+    found = bsdf_of_phong_eight(material, rows, wo, wi)
+    weight = select8v(found.density > 0.0, found.value * (1.0 / found.density), grey8(0.0))
+    once = constant8(material, rows, MIRROR, COLOR) * (1.0 / share.z)
+    return Sample8(
+        select8v(mirrors, mirrored, wi), select8v(mirrors, once, weight),
+        select8d(mirrors, splat8d(0.0), found.density),
+    )  # fmt: skip

@@ -24,15 +24,23 @@ from sightray.materials.base import (
     BsdfValue,
     Local,
     Material,
+    Sample8,
+    Value8,
     bsdf,
+    bsdf_eight,
     emitted,
     interior,
     local,
     sample_bsdf,
+    sample_eight,
 )  # fmt: skip
 from sightray.materials.body import check_body, medium_inside, stain
-from sightray.materials.data import data, share_of
+from sightray.materials.data import data, share8_of, share_of
 from sightray.materials.dielectric import Boundary, boundary_of
+from sightray.materials.eight_boundaries import Boundary8, back8
+from sightray.materials.eight_facets import facets8
+from sightray.materials.eight_layers import Layers8, layers_value8, sample_layers8, view8
+from sightray.materials.eight_missing import tables8, tables8_or
 from sightray.materials.energy import missing_of_glass, missing_of_mirrors, passing, reflected_by_glass
 from sightray.materials.gloss import glossy, softened
 from sightray.materials.index import disperses, index_at, indices_at
@@ -40,12 +48,29 @@ from sightray.materials.layers import COAT_INDEX, Layers, layers_value, sample_l
 from sightray.materials.microfacet import GGX, facets
 from sightray.materials.sheen import sheen_table
 from sightray.mathlib.bands import hero_only
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    abs8d,
+    gather8d,
+    gather8i,
+    not8,
+    select8d,
+    select8i,
+    select8v,
+    splat8d,
+    vmax8d,
+)
 from sightray.mathlib.frame import fresnel
+from sightray.mathlib.lanes import Mask8, movemask8
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, is_null, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, grey, max4
 from sightray.spectra import WAVELENGTHS
-from sightray.textures.base import Where, texture_value, textured, value_at
+from sightray.textures.base import Where, constant8, texture_value, textured, value_at
+from sightray.textures.constant import COLOR
 
 D_LINE, F_LINE, C_LINE = 587.56, 486.13, 656.27  # nm: between them Abbe's number measures dispersion
 
@@ -291,3 +316,93 @@ def emitted_by_principled(material: Table, where: Where, cos_view: f64) -> Vec3:
 @implements(interior, Principled)
 def interior_of_principled(material: Table) -> Table:
     return table_at(material, INSIDE)
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+@kernel
+def boundary8_of(
+    material: Table, rows: I64x8, roughness: F64x8, outside: Mask8, clear: F64x8, metal: I64x8
+) -> Boundary8:  # fmt: skip
+    """The boundaries of what is clear, from the viewers' sides; `metal` in place of tables that are not there."""
+    shape = facets8(0, roughness, gather8d(material, rows + ANISOTROPY))
+    ior, sheet = gather8d(material, rows + INDEX), gather8i(material, rows + THIN_WALLED) != 0
+    eta, enters = select8d(outside | sheet, 1.0 / ior, ior), gather8d(material, rows + ENTERS)
+    here, there, back = metal, metal, 1.0 - enters
+    if movemask8((clear > 0.0) & not8(sheet)) != 0:
+        out, within = tables8_or(material, rows, GLASS_OUT, metal), tables8_or(material, rows, GLASS_IN, metal)
+        here, there = select8i(outside, out, within), select8i(outside, within, out)
+        passed = select8d(outside, enters, gather8d(material, rows + LEAVES))
+        back = select8d(sheet, back, back8(material, roughness, eta, here, there, passed))
+    return Boundary8(shape, roughness, eta, here, there, back, sheet)
+
+
+@kernel
+def layers8_of(material: Table, rows: I64x8, outside: Mask8) -> Layers8:
+    """`layers_of` for eight paths."""
+    roughness = vmax8d(splat8d(SMOOTHEST), share8_of(material, rows, ROUGHNESS))
+    dielectric = 1.0 - share8_of(material, rows, METALLIC)
+    clear, metal = dielectric * share8_of(material, rows, TRANSMISSION), tables8(material, rows, METAL_TABLE)
+    zero = splat8d(0.0)
+    coat, coat_roughness, sheen, sheen_roughness = zero, zero, grey8(0.0), zero
+    coated = gather8i(material, rows + COAT_TABLE) != 0
+    if movemask8(coated) != 0:
+        coat = select8d(coated, share8_of(material, rows, CLEARCOAT), zero)
+        coat_roughness = vmax8d(splat8d(SMOOTHEST), share8_of(material, rows, CLEARCOAT_ROUGHNESS))
+    fibrous = gather8i(material, rows + SHEEN_TABLE) != 0
+    if movemask8(fibrous) != 0:
+        sheen = select8v(fibrous, constant8(material, rows, SHEEN, COLOR), sheen)
+        sheen_roughness = share8_of(material, rows, SHEEN_ROUGHNESS)
+    return Layers8(
+        constant8(material, rows, BASE_COLOR, COLOR),
+        1.0 - dielectric,
+        dielectric - clear,
+        clear,
+        share8_of(material, rows, SPECULAR),
+        1.0 / gather8d(material, rows + IOR),
+        boundary8_of(material, rows, roughness, outside, clear, metal),
+        coat,
+        coat_roughness,
+        sheen,
+        sheen_roughness,
+        metal,
+        tables8(material, rows, VARNISH_TABLE),
+        tables8_or(material, rows, COAT_TABLE, metal),
+        tables8_or(material, rows, SHEEN_TABLE, metal),
+    )
+
+
+@kernel
+def turned8(material: Table, rows: I64x8, w: Vec3x8, side: F64x8, sense: f64) -> Vec3x8:
+    """`along_grain` for a sense of 1, `across_grain` for -1; seen from the upper side."""
+    c, s = gather8d(material, rows + TURN), gather8d(material, rows + (TURN + 1)) * sense
+    return Vec3x8(c * w.x + s * w.y, c * w.y - s * w.x, w.z * side)
+
+
+@implements(sample_eight, Principled)
+def sample_principled_eight(
+    material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8
+) -> Sample8:  # fmt: skip
+    outside = wo.z > 0.0
+    side, layers = select8d(outside, splat8d(1.0), splat8d(-1.0)), layers8_of(material, rows, outside)
+    o = turned8(material, rows, wo, side, 1.0)
+    view = view8(material, layers, o)
+    i = sample_layers8(layers, view, o, u, v, choice)
+    found = layers_value8(material, layers, view, o, i)
+    possible = (abs8d(i.z) > 0.0) & (found.density > 0.0)
+    return Sample8(
+        select8v(possible, turned8(material, rows, i, side, -1.0), wo),
+        select8v(possible, found.value * (1.0 / found.density), grey8(0.0)),
+        select8d(possible, found.density, splat8d(0.0)),
+    )
+
+
+@implements(bsdf_eight, Principled)
+def bsdf_of_principled_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    outside = wo.z > 0.0
+    side, layers = select8d(outside, splat8d(1.0), splat8d(-1.0)), layers8_of(material, rows, outside)
+    o, i = turned8(material, rows, wo, side, 1.0), turned8(material, rows, wi, side, 1.0)
+    found = layers_value8(material, layers, view8(material, layers, o), o, i)
+    there = (abs8d(wo.z) > 0.0) & (abs8d(wi.z) > 0.0)
+    return Value8(select8v(there, found.value, grey8(0.0)), select8d(there, found.density, splat8d(0.0)))

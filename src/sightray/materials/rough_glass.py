@@ -6,18 +6,51 @@ from typing import Any
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, child, choice, color, derived_array, derived_child, derived_number, derived_vector
-from sightray.materials.base import BsdfSample, BsdfValue, Local, Material, bsdf, interior, local, sample_bsdf
+from sightray.materials.base import (
+    BsdfSample,
+    BsdfValue,
+    Local,
+    Material,
+    Sample8,
+    Value8,
+    bsdf,
+    bsdf_eight,
+    interior,
+    local,
+    sample_bsdf,
+    sample_eight,
+)
 from sightray.materials.body import check_body, medium_inside, stain
 from sightray.materials.by_wavelength import hero_share
-from sightray.materials.data import data, share_of
+from sightray.materials.data import data, share8_of, share_of
 from sightray.materials.dielectric import Boundary, boundary_of, pass_boundary, sample_boundary
-from sightray.materials.energy import missing_of_glass, passing
-from sightray.materials.glass import sample_smooth, shares_of_lanes
+from sightray.materials.eight_boundaries import Boundary8, back8, by_facet8, pass_boundary8
+from sightray.materials.eight_facets import facets8, facing8, sample_facet8, upward8
+from sightray.materials.eight_missing import sample_spread8, share_at8, tables8
+from sightray.materials.energy import SMOOTH, missing_of_glass, passing
+from sightray.materials.glass import sample_smooth, sample_smooth8, shares_of_lanes
 from sightray.materials.gloss import glossy, softened
 from sightray.materials.index import disperses, index, index_at, indices_at, nominal
-from sightray.materials.microfacet import DISTRIBUTIONS, facets, is_smooth
+from sightray.materials.microfacet import BECKMANN, DISTRIBUTIONS, facets, is_smooth
 from sightray.mathlib.bands import as_reflectance, hero_only, ones
+from sightray.mathlib.eight_paths import fresnel8, gather8v, grey8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    abs8d,
+    dot8,
+    gather8d,
+    gather8i,
+    mask8,
+    not8,
+    select8d,
+    select8i,
+    select8v,
+    splat8d,
+)
 from sightray.mathlib.frame import fresnel
+from sightray.mathlib.lanes import Mask8, movemask8
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, i64_at, table_at, vec3_at
 from sightray.mathlib.vec import Vec3, dot, grey, normalize
@@ -148,3 +181,74 @@ def local_of_rough_glass(material: Table, where: Where, cos_view: f64) -> Local:
 @implements(interior, RoughGlass)
 def interior_of_rough_glass(material: Table) -> Table:
     return table_at(material, INSIDE)
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+@kernel
+def bends_nothing8(material: Table, rows: I64x8, roughness: F64x8) -> Mask8:
+    """`bends_nothing` for eight paths."""
+    return (roughness * roughness <= SMOOTH) | (abs8d(gather8d(material, rows + IOR) - 1.0) < CLOSE_TO_ONE)
+
+
+@kernel
+def boundary8_seen(material: Table, rows: I64x8, roughness: F64x8, outside: Mask8) -> Boundary8:
+    """`boundary_seen` for eight paths."""
+    beckmann, ior = gather8i(material, rows + DISTRIBUTION) == BECKMANN, gather8d(material, rows + IOR)
+    shape, eta = facets8(movemask8(beckmann), roughness, splat8d(0.0)), select8d(outside, 1.0 / ior, ior)
+    out, within = tables8(material, rows, MISSING_OUTSIDE), tables8(material, rows, MISSING_INSIDE)
+    here, there = select8i(outside, out, within), select8i(outside, within, out)
+    passed = select8d(outside, gather8d(material, rows + ENTERS), gather8d(material, rows + LEAVES))
+    back = back8(material, roughness, eta, here, there, passed)
+    return Boundary8(shape, roughness, eta, here, there, back, mask8(0))
+
+
+@kernel
+def passed8(material: Table, rows: I64x8, b: Boundary8, lost: F64x8, o: Vec3x8, i: Vec3x8) -> Value8:
+    """`bsdf` of a rough boundary, on the viewer's side where z > 0."""
+    passage = pass_boundary8(material, b, lost, facing8(b.shape, o, upward8(i)), o, i)
+    colour = select8v(i.z > 0.0, grey8(1.0), gather8v(material, rows + TINT))
+    return Value8(colour * passage.value, passage.density)
+
+
+@implements(sample_eight, RoughGlass)
+def sample_rough_glass_eight(
+    material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8
+) -> Sample8:  # fmt: skip
+    roughness, outside = share8_of(material, rows, ROUGHNESS), wo.z > 0.0
+    smooth, found = bends_nothing8(material, rows, roughness), Sample8(wo, grey8(0.0), splat8d(0.0))
+    if movemask8(smooth) != 0:
+        found = sample_smooth8(gather8d(material, rows + IOR), gather8v(material, rows + TINT), wo, choice)
+    if movemask8(not8(smooth)) == 0:
+        return found
+    side, b = select8d(outside, splat8d(1.0), splat8d(-1.0)), boundary8_seen(material, rows, roughness, outside)
+    o = Vec3x8(wo.x, wo.y, wo.z * side)
+    lost = share_at8(material, b.here, roughness, o)
+    m, spread = sample_facet8(b.shape, o, u, v), choice < lost
+    i = by_facet8(b, o, m, choice - lost < (1.0 - lost) * fresnel8(dot8(o, m), b.eta))
+    if movemask8(spread) != 0:
+        many = sample_spread8(roughness, u, v, smooth)
+        up = choice < lost * b.back
+        i = select8v(spread, Vec3x8(many.x, many.y, select8d(up, many.z, -many.z)), i)
+    answer = passed8(material, rows, b, lost, o, i)
+    possible = (abs8d(i.z) > 0.0) & (answer.density > 0.0)
+    wi = select8v(possible, Vec3x8(i.x, i.y, i.z * side), wo)
+    weight = select8v(possible, answer.value * (1.0 / answer.density), grey8(0.0))
+    density = select8d(possible, answer.density, splat8d(0.0))
+    return Sample8(
+        select8v(smooth, found.wi, wi), select8v(smooth, found.weight, weight), select8d(smooth, found.density, density)
+    )  # fmt: skip
+
+
+@implements(bsdf_eight, RoughGlass)
+def bsdf_of_rough_glass_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    roughness, outside = share8_of(material, rows, ROUGHNESS), wo.z > 0.0
+    there = not8(bends_nothing8(material, rows, roughness)) & (abs8d(wo.z) > 0.0) & (abs8d(wi.z) > 0.0)
+    none = Value8(grey8(0.0), splat8d(0.0))
+    if movemask8(there) == 0:
+        return none
+    side, b = select8d(outside, splat8d(1.0), splat8d(-1.0)), boundary8_seen(material, rows, roughness, outside)
+    o, i = Vec3x8(wo.x, wo.y, wo.z * side), Vec3x8(wi.x, wi.y, wi.z * side)
+    found = passed8(material, rows, b, share_at8(material, b.here, roughness, o), o, i)
+    return Value8(select8v(there, found.value, none.value), select8d(there, found.density, none.density))

@@ -9,8 +9,22 @@ import numpy as np
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, color, derived_vector, number
-from sightray.materials.base import PHONG, BsdfSample, Local, Material, local, sample_bsdf
+from sightray.materials.base import PHONG, BsdfSample, Local, Material, Sample8, local, sample_bsdf, sample_eight
 from sightray.mathlib.bands import as_reflectance, ones
+from sightray.mathlib.eight_functions import exp8
+from sightray.mathlib.eight_paths import brightest8, gather8v, plus8, quotient8
+from sightray.mathlib.eights import (
+    F64x8,
+    I64x8,
+    Vec3x8,
+    abs8d,
+    gather8d,
+    select8v,
+    splat8d,
+    sqrt8d,
+    vmax8d,
+    vmin8d,
+)
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.table import Table, f64_at, vec3_at
 from sightray.mathlib.vec import Vec3, grey, max4, vexp
@@ -97,3 +111,31 @@ def local_of_thin_glass(material: Table, where: Where, cos_view: f64) -> Local:
     zero = grey(0.0)
     back, on = pane(material, where.bands, abs(cos_view))
     return Local(on, zero, zero, zero, zero, 0.0, PHONG, back, on, 1.0, zero)
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+@kernel
+def ways8(share: F64x8, a: Vec3x8) -> tuple[Vec3x8, Vec3x8]:
+    """`both_faces` and `through` for eight paths."""
+    passed = quotient8(a * ((1.0 - share) * (1.0 - share)), plus8(-(a * a * (share * share)), splat8d(1.0)))
+    return plus8(passed * a * share, share), passed
+
+
+@implements(sample_eight, ThinGlass)
+def sample_thin_glass_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
+    ior, cos_i, most = gather8d(material, rows + IOR), vmax8d(abs8d(wo.z), splat8d(1e-9)), splat8d(MOST)
+    cos_t = sqrt8d(1.0 - vmax8d(splat8d(0.0), 1.0 - cos_i * cos_i) / (ior * ior))
+    r_s, r_p = (cos_i - ior * cos_t) / (cos_i + ior * cos_t), (ior * cos_i - cos_t) / (ior * cos_i + cos_t)
+    longer = gather8v(material, rows + LOG_TINT) * (1.0 / vmax8d(cos_t, splat8d(1e-9)))
+    a = Vec3x8(exp8(longer.x), exp8(longer.y), exp8(longer.z))
+    back_s, on_s = ways8(vmin8d(r_s * r_s, most), a)
+    back_p, on_p = ways8(vmin8d(r_p * r_p, most), a)
+    back, on = (back_s + back_p) * 0.5, (on_s + on_p) * 0.5
+    odds = brightest8(back) / (brightest8(back) + brightest8(on))
+    mirrored = choice < odds
+    return Sample8(
+        select8v(mirrored, Vec3x8(-wo.x, -wo.y, wo.z), -wo),
+        select8v(mirrored, back * (1.0 / odds), on * (1.0 / (1.0 - odds))), splat8d(0.0),
+    )  # fmt: skip

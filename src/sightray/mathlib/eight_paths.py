@@ -50,6 +50,24 @@ def brightest8(a: Vec3x8) -> F64x8:
 
 
 @kernel
+def plus8(a: Vec3x8, value: F64x8) -> Vec3x8:
+    """The same value added to red, green and blue."""
+    return Vec3x8(a.x + value, a.y + value, a.z + value)
+
+
+@kernel
+def quotient8(a: Vec3x8, b: Vec3x8) -> Vec3x8:
+    """Quotients of each component."""
+    return Vec3x8(a.x / b.x, a.y / b.y, a.z / b.z)
+
+
+@kernel
+def normalize8(a: Vec3x8) -> Vec3x8:
+    """Vectors of length 1."""
+    return a * (1.0 / sqrt8d(dot8(a, a)))
+
+
+@kernel
 def gather8v(table: Table, index: I64x8) -> Vec3x8:
     """The vectors in three words each."""
     return Vec3x8(gather8d(table, index), gather8d(table, index + 1), gather8d(table, index + 2))
@@ -96,14 +114,20 @@ def put_lane(table: Table, index: i64, a: Vec3) -> None:
 
 
 @kernel
-def cosine_hemisphere8(u: F64x8, v: F64x8) -> Vec3x8:
-    """`warp.cosine_hemisphere`."""
+def concentric8(u: F64x8, v: F64x8) -> tuple[F64x8, F64x8]:
+    """`warp.concentric`."""
     a, b = 2.0 * u - 1.0, 2.0 * v - 1.0
     wide = abs8d(a) > abs8d(b)
     long, short = select8d(wide, a, b), select8d(wide, b, a)
     q = short / select8d(abs8d(long) > 0.0, long, splat8d(1.0))
     along, across = long * cosine_of_octant8(q), long * sine_of_octant8(q)
-    x, y = select8d(wide, along, across), select8d(wide, across, along)
+    return select8d(wide, along, across), select8d(wide, across, along)
+
+
+@kernel
+def cosine_hemisphere8(u: F64x8, v: F64x8) -> Vec3x8:
+    """`warp.cosine_hemisphere`."""
+    x, y = concentric8(u, v)
     return Vec3x8(x, y, sqrt8d(vmax8d(splat8d(0.0), 1.0 - x * x - y * y)))
 
 

@@ -148,6 +148,12 @@ def gather8i(table: Table, index: I64x8) -> I64x8:
 
 
 @primitive
+def gather8f(table: Table, index: I64x8) -> F64x8:
+    """The floats at eight places, counted in floats from a table."""
+    return F64x8([ctypes.c_float.from_address(table.address + 4 * int(k)).value for k in index.values])
+
+
+@primitive
 def store_chosen8d(table: Table, index: i64, a: F64x8, chosen: Mask8) -> None:
     """Write the chosen of eight doubles side by side from word `index` on; up to eight words are overwritten."""
     kept = a.values[chosen.bits]
@@ -217,6 +223,18 @@ def sqrt8d(a: F64x8) -> F64x8:
 
 
 @primitive
+def bits8d(a: F64x8) -> I64x8:
+    """The 64 bits of each double."""
+    return I64x8(a.values.view(np.int64))
+
+
+@primitive
+def of_bits8d(a: I64x8) -> F64x8:
+    """The doubles that these bits are."""
+    return F64x8(a.values.view(np.float64))
+
+
+@primitive
 def sign8d(a: F64x8) -> F64x8:
     """1 with the sign of each lane, that of zero included."""
     return F64x8(np.copysign(1.0, a.values))
@@ -238,6 +256,12 @@ def whole8i(a: F32x8) -> I64x8:
 def floor8i(a: F64x8) -> I64x8:
     """Doubles that are not negative as integers, rounded down."""
     return I64x8(a.values.astype(np.int64))
+
+
+@primitive
+def floor8d(a: F64x8) -> F64x8:
+    """The largest whole numbers that are not above each lane."""
+    return F64x8(np.floor(a.values))
 
 
 @primitive

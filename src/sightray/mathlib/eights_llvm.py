@@ -211,6 +211,15 @@ _memory("d", DOUBLES, F64)
 _memory("i", INTEGERS, I64)
 
 
+@lower(eights.gather8f)
+def gather8f(builder: Any, table: Any, index: Any) -> Any:
+    value = ir.Constant(ir.VectorType(F32, 8), ir.Undefined)
+    for k in range(8):
+        at = element(builder, table, builder.extract_element(index, I32(k)), F32, 4)
+        value = builder.insert_element(value, builder.load(at, align=4), I32(k))
+    return builder.fpext(value, DOUBLES)
+
+
 @lower(eights.splat8v)
 def splat8v(builder: Any, value: Any) -> Any:
     return _vector(builder, [_splat(builder, lane(builder, value, axis)) for axis in range(3)])
@@ -250,6 +259,16 @@ def sqrt8d(builder: Any, a: Any) -> Any:
     return llvm_function(builder, "llvm.sqrt.v8f64", DOUBLES, a)
 
 
+@lower(eights.bits8d)
+def bits8d(builder: Any, a: Any) -> Any:
+    return builder.bitcast(a, INTEGERS)
+
+
+@lower(eights.of_bits8d)
+def of_bits8d(builder: Any, a: Any) -> Any:
+    return builder.bitcast(a, DOUBLES)
+
+
 @lower(eights.sign8d)
 def sign8d(builder: Any, a: Any) -> Any:
     one = ir.Constant(DOUBLES, [1.0] * 8)
@@ -259,6 +278,11 @@ def sign8d(builder: Any, a: Any) -> Any:
 @lower(eights.whole8d)
 def whole8d(builder: Any, a: Any) -> Any:
     return builder.sitofp(a, DOUBLES)
+
+
+@lower(eights.floor8d)
+def floor8d(builder: Any, a: Any) -> Any:
+    return llvm_function(builder, "llvm.floor.v8f64", DOUBLES, a)
 
 
 @lower(eights.floor8i)

@@ -164,7 +164,7 @@ class Compiled:
 
     @functools.cached_property
     def for_eight(self) -> bool:
-        """Whether paths may be followed eight at once: nothing moves, and no medium is about."""
+        """Whether paths may be followed eight at once: no medium is about."""
         return self.scene.medium is None and are_for_eight(self.items, self._flags())
 
     @functools.cached_property

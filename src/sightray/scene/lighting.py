@@ -37,7 +37,7 @@ def pack_glow(
     `things` are the scene's items, `items` their rows; those of the objects numbered in `own` belong to lamps.
     """
     rows = [tables.row_of(light) for light in lamps]
-    bounds = [(k, light.bounds()) for k, light in enumerate(lamps)]
+    bounds = [(k, None if light.infinite else light.bounds()) for k, light in enumerate(lamps)]  # skies stand apart
     for index, thing in enumerate(things):
         known = thing.object in own or thing.placement is not None  # what moves is found by chance alone
         glowing = None if known else lights_of(thing)

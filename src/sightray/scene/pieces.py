@@ -53,7 +53,7 @@ def pieces_of(items: Sequence[Any], flags: Sequence[int]) -> tuple[list[Flat], l
     balls: list[int] = []
     for index, (item, flag) in enumerate(zip(items, flags, strict=True)):
         plain = item.transform.is_identity and item.placement is None and not flag & LEFT_OUT
-        if not plain or not has_kind(item.material):
+        if not plain or not has_kind(item.material) or item.material.filled:
             return None
         shape = item.shape
         if isinstance(shape, Sphere):

@@ -178,6 +178,8 @@ def directional_albedo(material, angle, count=22_500):
     pytest.param(lambda r: sr.Principled(base_color=1, roughness=r), id="plastic"),
     pytest.param(lambda r: sr.Principled(base_color=1, metallic=1, roughness=r), id="white-metal"),
     pytest.param(lambda r: sr.Principled(base_color=1, transmission=1, roughness=r, ior=1.8), id="clear"),
+    pytest.param(lambda r: sr.Principled(base_color=1, transmission=1, roughness=r, ior=1), id="clear-as-air"),
+    pytest.param(lambda r: sr.Principled(base_color=1, roughness=r, ior=1), id="without-varnish"),
     pytest.param(lambda r: sr.Principled(base_color=1, transmission=1, roughness=r, thin_walled=True), id="sheet"),
     pytest.param(lambda r: sr.Principled(base_color=1, transmission=0.4, metallic=0.3, roughness=r), id="all"),
     pytest.param(lambda r: sr.Principled(base_color=1, metallic=1, roughness=r, anisotropy=0.7), id="brushed-base"),

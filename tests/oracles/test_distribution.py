@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sightray._jit import kernel, native
-from sightray.mathlib.distribution import cumulated, draw_cell, eights, within_from
+from sightray.mathlib.distribution import coarsest, cumulated, draw_cell, places_of
 from sightray.mathlib.scalars import i64
 from sightray.mathlib.table import Table, f64_at, f64_put
 
@@ -34,6 +34,8 @@ def pictures():
     yield "holes", rng.random((20, 31)) * (rng.random((20, 31)) < 0.2) * (rng.random((20, 1)) < 0.5)
     yield "spots", spots
     yield "steep", 10.0 ** rng.uniform(-30, 30, (25, 50))
+    for width in (7, 8, 63, 64, 65, 127, 128):  # about whole lines of a cache
+        yield f"{width} columns", rng.random((3, width)) ** 4
     yield "row", rng.random((1, 500)) ** 8
     yield "column", rng.random((500, 1)) ** 8
 
@@ -42,7 +44,7 @@ def pictures():
 def test_cells_are_those_whose_sums_hold_the_numbers(weights):
     h, w = weights.shape
     table = cumulated(weights)
-    rows, within = table[: h + 1], table[within_from(w, h) :].reshape(h, 8 * eights(w))[:, : w + 1]
+    rows, within = table[: h + 1], table[places_of(w, h).every :].reshape(h, 64 * coarsest(w))[:, : w + 1]
     rng = np.random.default_rng(2)
     # Numbers anywhere, and at and beside the sums.
     sums = np.concatenate([rows, within.ravel()])

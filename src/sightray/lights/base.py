@@ -17,7 +17,6 @@ from sightray._jit import implements, kernel, method
 from sightray.mathlib.bands import as_light
 from sightray.mathlib.eight_paths import lane_at, load8v, put_lane, store8v
 from sightray.mathlib.eights import F64x8, Vec3x8, load8d, store8d
-from sightray.mathlib.lanes import lowest_bit
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, f64_put, is_null, scratch
 from sightray.mathlib.vec import Vec3, grey
@@ -145,25 +144,12 @@ def illuminate_eight(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample
 
 
 @implements(illuminate_eight, Light)
-def illuminate_all(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
-    none = LightSample8(p, u, p, u)
-    return illuminate_one_by_one(light, p, u, v, none, 255)
-
-
-@kernel
-def illuminate_one_by_one(light: Table, p: Vec3x8, u: F64x8, v: F64x8, known: LightSample8, bits: i64) -> LightSample8:
-    """`illuminate_eight` for the points in `bits`, by `illuminate`; what is known of the others is kept."""
+def illuminate_one_by_one(light: Table, p: Vec3x8, u: F64x8, v: F64x8) -> LightSample8:
     words = scratch(104)
     store8v(words, 0, p)
     store8d(words, 24, u)
     store8d(words, 32, v)
-    store8v(words, 40, known.direction)
-    store8v(words, 64, known.irradiance)
-    store8d(words, 88, known.distance)
-    store8d(words, 96, known.density)
-    while bits != 0:
-        k = lowest_bit(bits)
-        bits &= bits - 1
+    for k in range(8):
         found = illuminate(light, lane_at(words, k), WHOLE, f64_at(words, 24 + k), f64_at(words, 32 + k))
         put_lane(words, 40 + k, found.direction)
         put_lane(words, 64 + k, found.irradiance)

@@ -76,7 +76,7 @@ class EnvironmentLight(_Lit):
 
     Directions are chosen in proportion to luminance times solid angle, pixel by pixel. A pixel's luminance is the mean
     over its area of what the lookup between pixels gives, which is (1, 6, 1)/8 of it and its neighbours along either
-    axis, so that no light is left out. The picture takes 20 bytes a pixel. `grid` cells divide the picture's light,
+    axis, so that no light is left out. The picture takes 21 bytes a pixel. `grid` cells divide the picture's light,
     not its area. Where a `spectrum` is stated, all of the picture has it: its pixels count by their luminance.
 
     Reference: M. Pharr, W. Jakob, G. Humphreys, Physically Based Rendering, 4th ed. 2023, section 12.5.

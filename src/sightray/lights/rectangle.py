@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,20 @@ from sightray.lights.base import (
     flat,
     illuminate,
     illuminate_eight,
-    illuminate_one_by_one,
     polygon,
 )
-from sightray.lights.window import NEAR, Window, in_window, window_of
-from sightray.mathlib.eights import F64x8, Vec3x8, dot8, splat8d, splat8v
+from sightray.lights.window import NEAR, Window, glimpse8, in_window, window_of
+from sightray.mathlib.eight_paths import grey8
+from sightray.mathlib.eights import (
+    F64x8,
+    Vec3x8,
+    dot8,
+    select8d,
+    select8v,
+    splat8d,
+    splat8v,
+    sqrt8d,
+)
 from sightray.mathlib.lanes import movemask8
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, f64_at, i64_at, vec3_at
@@ -132,10 +142,17 @@ def illuminate_eight_from_rectangle(light: Table, p: Vec3x8, u: F64x8, v: F64x8)
     to_light = to_corner + edge_u * u + edge_v * v
     found = from_pieces8(light, to_light, vec3_at(light, NORMAL), area, i64_at(light, TWO_SIDED) != 0)
     to_middle = to_corner + (edge_u + edge_v) * 0.5
-    near = movemask8(dot8(to_middle, to_middle) * NEAR <= splat8d(area))
-    if i64_at(light, UPRIGHT) == 0 or near == 0:
+    if i64_at(light, UPRIGHT) == 0 or movemask8(dot8(to_middle, to_middle) * NEAR <= splat8d(area)) == 0:
         return found
-    return illuminate_one_by_one(light, p, u, v, found, near)
+    glimpse = glimpse8(to_corner, vec3_at(light, EDGE_U), vec3_at(light, EDGE_V), area, u, v)
+    r, solid_angle = sqrt8d(dot8(glimpse.way, glimpse.way)), glimpse.solid_angle
+    lit = dot8(glimpse.way, splat8v(vec3_at(light, NORMAL))) < (math.inf if i64_at(light, TWO_SIDED) != 0 else 0.0)
+    irradiance = select8v(lit, splat8v(vec3_at(light, RADIANCE)) * solid_angle, grey8(0.0))
+    shown, near = 1.0 if i64_at(light, VISIBLE) != 0 else 0.0, solid_angle > 0.0
+    return LightSample8(
+        select8v(near, glimpse.way * (1.0 / r), found.direction), select8d(near, r, found.distance),
+        select8v(near, irradiance, found.irradiance), select8d(near, shown / solid_angle, found.density),
+    )  # fmt: skip
 
 
 @implements(direction_density, RectangleLight)

@@ -10,6 +10,20 @@ import math
 from typing import NamedTuple
 
 from sightray._jit import kernel
+from sightray.mathlib.eight_functions import atan2_8, circle8
+from sightray.mathlib.eights import (
+    F64x8,
+    Vec3x8,
+    abs8d,
+    dot8,
+    select8d,
+    sign8d,
+    splat8d,
+    splat8v,
+    sqrt8d,
+    vmax8d,
+    vmin8d,
+)
 from sightray.mathlib.scalars import f64
 from sightray.mathlib.vec import Vec3, cross, dot, length
 
@@ -85,3 +99,46 @@ def in_window(window: Window, u: f64, v: f64) -> Vec3:
     y = height * math.sqrt(d2 / max(1.0 - height * height, 1e-300))
     y = min(max(y, window.y0), window.y1)
     return window.x_axis * x + window.y_axis * y + window.z_axis * z
+
+
+# ---------------------------------------------------------------------------------------------------- for eight paths
+
+
+class Glimpse8(NamedTuple):
+    """Ways from eight points to one of a rectangle's each, even in solid angle, and that solid angle."""
+
+    way: Vec3x8
+    solid_angle: F64x8  # 0 as in `Window`
+
+
+@kernel
+def angle8(cosine: F64x8) -> F64x8:
+    """Angles of these cosines."""
+    return atan2_8(sqrt8d(vmax8d(splat8d(0.0), (1.0 - cosine) * (1.0 + cosine))), cosine)
+
+
+@kernel
+def glimpse8(to_corner: Vec3x8, edge_u: Vec3, edge_v: Vec3, area: f64, u: F64x8, v: F64x8) -> Glimpse8:
+    """`window_of` and `in_window` for eight points, from which a corner is at `to_corner`."""
+    w, h = length(edge_u), length(edge_v)
+    x_axis, y_axis, z_axis = splat8v(edge_u / w), splat8v(edge_v / h), splat8v(cross(edge_u, edge_v) / (w * h))
+    x0, y0, z = dot8(to_corner, x_axis), dot8(to_corner, y_axis), dot8(to_corner, z_axis)
+    x1, y1, z2 = x0 + w, y0 + h, z * z
+    b0, b1 = -(y0 / sqrt8d(z2 + y0 * y0)), y1 / sqrt8d(z2 + y1 * y1)
+    c0, c1 = -(x0 / sqrt8d(z2 + x0 * x0)), x1 / sqrt8d(z2 + x1 * x1)
+    k = 2.0 * math.pi - angle8(-(b1 * c0)) - angle8(-(c0 * b0))
+    solid_angle = angle8(-(b0 * c1)) + angle8(-(c1 * b1)) - k
+    middle = to_corner + splat8v((edge_u + edge_v) * 0.5)
+    near = (dot8(middle, middle) * NEAR <= area) & (z2 > FLAT * area) & (solid_angle >= LEAST)
+
+    cosine, sine = circle8((u * solid_angle + k) * (0.5 / math.pi))
+    f = (cosine * b0 - b1) / sine
+    c = vmin8d(splat8d(1.0), vmax8d(splat8d(-1.0), sign8d(f) / sqrt8d(f * f + b0 * b0)))
+    x = c * abs8d(z) / sqrt8d(vmax8d(1.0 - c * c, splat8d(1e-300)))
+    x = vmin8d(vmax8d(x, x0), x1)
+    d2 = x * x + z2
+    h0, h1 = y0 / sqrt8d(d2 + y0 * y0), y1 / sqrt8d(d2 + y1 * y1)
+    height = h0 + v * (h1 - h0)
+    y = height * sqrt8d(d2 / vmax8d(1.0 - height * height, splat8d(1e-300)))
+    y = vmin8d(vmax8d(y, y0), y1)
+    return Glimpse8(x_axis * x + y_axis * y + z_axis * z, select8d(near, solid_angle, splat8d(0.0)))

@@ -42,6 +42,8 @@ class Facets8(NamedTuple):
 def facets8(beckmann: i64, roughness: F64x8, anisotropy: F64x8) -> Facets8:
     """`microfacet.facets`."""
     alpha = vmax8d(roughness * roughness, splat8d(SMOOTH))
+    if movemask8(abs8d(anisotropy) > 0.0) == 0:
+        return Facets8(beckmann, alpha, alpha)
     aspect = sqrt8d(1.0 - MOST_UNEVEN * abs8d(anisotropy))
     aspect = select8d(anisotropy < 0.0, 1.0 / aspect, aspect)
     one = splat8d(1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from sightray._jit import implements, kernel
 from sightray.fields import Color, choice, color, number
@@ -150,29 +150,45 @@ def emitted_by_phong(material: Table, where: Where, cos_view: f64) -> Vec3:
     return vec3_at(material, EMISSION)
 
 
+class Parts8(NamedTuple):
+    """Colours, and `parts`, of eight materials."""
+
+    diffuse: Vec3x8
+    specular: Vec3x8
+    mirror: Vec3x8
+    share: Vec3x8
+
+
 @kernel
-def parts8(material: Table, rows: I64x8) -> Vec3x8:
-    """`parts` for eight paths."""
+def parts8(material: Table, rows: I64x8) -> Parts8:
+    """What eight materials are made of."""
     diffuse, specular, mirror = (
-        brightest8(constant8(material, rows, DIFFUSE, COLOR)),
-        brightest8(constant8(material, rows, SPECULAR, COLOR)),
-        brightest8(constant8(material, rows, MIRROR, COLOR)),
+        constant8(material, rows, DIFFUSE, COLOR),
+        constant8(material, rows, SPECULAR, COLOR),
+        constant8(material, rows, MIRROR, COLOR),
     )
-    total = diffuse + specular + mirror
-    shares = Vec3x8(diffuse, specular, mirror) * (1.0 / total)
-    return select8v(total > 0.0, shares, Vec3x8(splat8d(1.0), splat8d(0.0), splat8d(0.0)))
+    share = Vec3x8(brightest8(diffuse), brightest8(specular), brightest8(mirror))
+    total = share.x + share.y + share.z
+    alone = Vec3x8(splat8d(1.0), splat8d(0.0), splat8d(0.0))
+    return Parts8(diffuse, specular, mirror, select8v(total > 0.0, share * (1.0 / total), alone))
+
+
+@kernel
+def value8(parts: Parts8, exponent: F64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
+    """`bsdf` of eight materials."""
+    there, cosine = wo.z * wi.z > 0.0, abs8d(wi.z)
+    f, density = parts.diffuse * (1.0 / math.pi), parts.share.x * cosine * (1.0 / math.pi)
+    if movemask8(parts.share.y > 0.0) != 0:
+        along = vmax8d(splat8d(0.0), dot8(Vec3x8(-wo.x, -wo.y, wo.z), wi))
+        lobe = pow8(along, exponent) * (0.5 / math.pi)
+        f = f + parts.specular * ((exponent + 2.0) * lobe)
+        density = density + parts.share.y * (exponent + 1.0) * lobe
+    return Value8(select8v(there, f * cosine, grey8(0.0)), select8d(there, density, splat8d(0.0)))
 
 
 @implements(bsdf_eight, Phong)
 def bsdf_of_phong_eight(material: Table, rows: I64x8, wo: Vec3x8, wi: Vec3x8) -> Value8:
-    n, share = gather8d(material, rows + SHININESS), parts8(material, rows)
-    along = vmax8d(splat8d(0.0), dot8(Vec3x8(-wo.x, -wo.y, wo.z), wi))
-    lobe = pow8(along, n) * (0.5 / math.pi)
-    there, cosine = wo.z * wi.z > 0.0, abs8d(wi.z)
-    f = constant8(material, rows, DIFFUSE, COLOR) * (1.0 / math.pi)
-    f = f + constant8(material, rows, SPECULAR, COLOR) * ((n + 2.0) * lobe)
-    density = share.x * cosine * (1.0 / math.pi) + share.y * (n + 1.0) * lobe
-    return Value8(select8v(there, f * cosine, grey8(0.0)), select8d(there, density, splat8d(0.0)))
+    return value8(parts8(material, rows), gather8d(material, rows + SHININESS), wo, wi)
 
 
 @kernel
@@ -186,17 +202,17 @@ def highlight8(exponent: F64x8, axis: Vec3x8, u: F64x8, v: F64x8) -> Vec3x8:
 
 @implements(sample_eight, Phong)
 def sample_phong_eight(material: Table, rows: I64x8, wo: Vec3x8, u: F64x8, v: F64x8, choice: F64x8) -> Sample8:
-    share, mirrored = parts8(material, rows), Vec3x8(-wo.x, -wo.y, wo.z)
+    parts, exponent = parts8(material, rows), gather8d(material, rows + SHININESS)
+    mirrored, share = Vec3x8(-wo.x, -wo.y, wo.z), parts.share
     mirrors = choice < share.z
     matte = not8(mirrors) & (choice < share.z + share.x)
     wi = cosine_hemisphere8(u, v)
     wi = select8v(wo.z > 0.0, wi, -wi)
     if movemask8(mirrors | matte) != 255:
-        wi = select8v(matte, wi, highlight8(gather8d(material, rows + SHININESS), mirrored, u, v))
-    found = bsdf_of_phong_eight(material, rows, wo, wi)
+        wi = select8v(matte, wi, highlight8(exponent, mirrored, u, v))
+    found = value8(parts, exponent, wo, wi)
     weight = select8v(found.density > 0.0, found.value * (1.0 / found.density), grey8(0.0))
-    once = constant8(material, rows, MIRROR, COLOR) * (1.0 / share.z)
     return Sample8(
-        select8v(mirrors, mirrored, wi), select8v(mirrors, once, weight),
+        select8v(mirrors, mirrored, wi), select8v(mirrors, parts.mirror * (1.0 / share.z), weight),
         select8d(mirrors, splat8d(0.0), found.density),
     )  # fmt: skip

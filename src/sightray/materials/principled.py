@@ -72,6 +72,7 @@ from sightray.spectra import WAVELENGTHS
 from sightray.textures.base import Where, constant8, texture_value, textured, value_at
 from sightray.textures.constant import COLOR
 
+LEAST_INDEX = 1.0001  # where nothing bends light no facet says where it goes, and a lobe has no width
 D_LINE, F_LINE, C_LINE = 587.56, 486.13, 656.27  # nm: between them Abbe's number measures dispersion
 
 
@@ -137,7 +138,7 @@ class Principled(Material):
     _leaves: Any = derived_number("and that leaves", lambda p: passing(p.ior)[1])
     _turn: Any = derived_vector("cosine and sine of the rotation", lambda p: (
         math.cos(math.radians(p.anisotropy_rotation)), math.sin(math.radians(p.anisotropy_rotation)), 0.0))  # fmt: skip
-    _index: Any = derived_number("refractive index at the d line", lambda p: p.ior)
+    _index: Any = derived_number("refractive index of what is clear at the d line", lambda p: max(p.ior, LEAST_INDEX))
     _indices: Any = derived_array("and by wavelength, if it differs; read as the word behind", lambda p: p.indices())
 
     def check(self) -> None:
@@ -171,11 +172,11 @@ class Principled(Material):
         return None if isinstance(self.emission, tuple) else self.emission
 
     def indices(self) -> Any:
-        """The refractive index at `WAVELENGTHS`, (471,), or None; at least 1."""
+        """The refractive index at `WAVELENGTHS`, (471,), or None; at least `LEAST_INDEX`."""
         if not (self.dispersion > 0.0 and _there(self.transmission)) or self.thin_walled:
             return None
         b = (self.ior - 1.0) * self.dispersion / 20.0 / (F_LINE**-2 - C_LINE**-2)
-        return np.maximum(1.0, self.ior + b * (WAVELENGTHS**-2.0 - D_LINE**-2))
+        return np.maximum(LEAST_INDEX, self.ior + b * (WAVELENGTHS**-2.0 - D_LINE**-2))
 
     def inside(self) -> Any:
         """The medium inside, or None; sheets have none, and neither have opaque bodies."""
@@ -327,8 +328,9 @@ def boundary8_of(
 ) -> Boundary8:  # fmt: skip
     """The boundaries of what is clear, from the viewers' sides; `metal` in place of tables that are not there."""
     shape = facets8(0, roughness, gather8d(material, rows + ANISOTROPY))
-    ior, sheet = gather8d(material, rows + INDEX), gather8i(material, rows + THIN_WALLED) != 0
-    eta, enters = select8d(outside | sheet, 1.0 / ior, ior), gather8d(material, rows + ENTERS)
+    sheet, enters = gather8i(material, rows + THIN_WALLED) != 0, gather8d(material, rows + ENTERS)
+    ior = select8d(sheet, gather8d(material, rows + IOR), gather8d(material, rows + INDEX))
+    eta = select8d(outside | sheet, 1.0 / ior, ior)
     here, there, back = metal, metal, 1.0 - enters
     if movemask8((clear > 0.0) & not8(sheet)) != 0:
         out, within = tables8_or(material, rows, GLASS_OUT, metal), tables8_or(material, rows, GLASS_IN, metal)

@@ -17,7 +17,6 @@ from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, aligned, f64_at
 
 BELOW_ONE = 1.0 - 2.0**-53
-EIGHT = 8  # sums in one line of a cache
 NEVER = 2.0  # a sum that no number reaches
 
 
@@ -44,9 +43,9 @@ class CellDraw8(NamedTuple):
 def cumulated(weights: np.ndarray) -> np.ndarray:
     """The table that the kernels read, float64.
 
-    First h + 1 sums over rows; then every eighth of the w + 1 sums within each row, which are searched first, as they
-    are few enough to stay in a cache; then all of these, where one line of a cache has eight. Rows are filled up to
-    whole eights with what is never drawn.
+    First h + 1 sums over rows. Then, of the w + 1 sums within each row, every 64th, which few lines of a cache hold; then
+    every eighth, of which a line has what is between two of the former; then all. Rows are filled up to whole 64s with
+    what is never drawn.
 
     `weights` is (h, w) and not negative; cells without weight are never drawn. If there is no weight at all, all cells
     are alike.
@@ -56,37 +55,49 @@ def cumulated(weights: np.ndarray) -> np.ndarray:
     rows = weights.sum(axis=1)
     if not rows.any():
         weights, rows = np.ones((h, w)), np.full(h, float(w))
-    first = within_from(w, h)
-    table = aligned(first + h * EIGHT * eights(w), np.float64)
-    table[:] = NEVER
+    places, length = places_of(w, h), 64 * coarsest(w)
+    table = aligned(places.every + h * length, np.float64)
     table[: h + 1] = np.concatenate([[0.0], rows.cumsum()])
     table[1 : h + 1] /= table[h]
-    within = table[first:].reshape(h, EIGHT * eights(w))
-    within[:, 0] = 0.0
+    within = table[places.every :].reshape(h, length)
+    within[:, 0], within[:, w + 1 :] = 0.0, NEVER
     np.cumsum(weights, axis=1, out=within[:, 1 : w + 1])
     within[:, 1 : w + 1] /= np.where(within[:, w : w + 1] > 0.0, within[:, w : w + 1], 1.0)
-    table[h + 1 : h + 1 + h * eights(w)] = within[:, ::EIGHT].ravel()
+    for place, step in ((places.every_64th, 64), (places.every_8th, 8)):
+        chosen = within[:, ::step].ravel()
+        table[place : place + chosen.size] = chosen
     return table
 
 
-@kernel
-def eights(w: i64) -> i64:
-    """How many eights hold w + 1 sums."""
-    return w // EIGHT + 1
+class Places(NamedTuple):
+    """At which words of the table the sums within rows begin."""
+
+    every_64th: i64
+    every_8th: i64
+    every: i64
 
 
 @kernel
-def within_from(w: i64, h: i64) -> i64:
-    """The word at which the sums within rows begin: a whole number of eights."""
-    return (h + h * eights(w)) // EIGHT * EIGHT + EIGHT
+def coarsest(w: i64) -> i64:
+    """How many of the w + 1 sums within a row are each 64th."""
+    return w // 64 + 1
+
+
+@kernel
+def places_of(w: i64, h: i64) -> Places:
+    """Where sums begin, in whole lines of a cache."""
+    rows, coarse = h // 8 * 8 + 8, (h * coarsest(w) + 7) // 8 * 8
+    return Places(rows, rows + coarse, rows + coarse + 8 * h * coarsest(w))
 
 
 @kernel
 def draw_cell(table: Table, w: i64, h: i64, u: f64, v: f64) -> CellDraw:
     """Draw a point by two uniform numbers: u for the column, v for the row."""
-    row, blocks = interval(table, 0, h, v), eights(w)
-    start, block = within_from(w, h) + row * EIGHT * blocks, interval(table, h + 1 + row * blocks, blocks, u)
-    column = EIGHT * block + interval(table, start + EIGHT * block, EIGHT, u)
+    row, coarse, places = interval(table, 0, h, v), coarsest(w), places_of(w, h)
+    column = 8 * interval(table, places.every_64th + row * coarse, coarse, u)
+    column = 8 * (column + interval(table, places.every_8th + row * 8 * coarse + column, 8, u))
+    start = places.every + row * 64 * coarse
+    column += interval(table, start + column, 8, u)
     low, share = f64_at(table, row), f64_at(table, row + 1) - f64_at(table, row)
     left, part = f64_at(table, start + column), f64_at(table, start + column + 1) - f64_at(table, start + column)
     return CellDraw(row, column, share * part, min((u - left) / part, BELOW_ONE), min((v - low) / share, BELOW_ONE))
@@ -95,7 +106,7 @@ def draw_cell(table: Table, w: i64, h: i64, u: f64, v: f64) -> CellDraw:
 @kernel
 def cell_probability(table: Table, w: i64, h: i64, row: i64, column: i64) -> f64:
     """Probability with which `draw_cell` draws a cell."""
-    at = within_from(w, h) + row * EIGHT * eights(w) + column
+    at = places_of(w, h).every + row * 64 * coarsest(w) + column
     return (f64_at(table, row + 1) - f64_at(table, row)) * (f64_at(table, at + 1) - f64_at(table, at))
 
 
@@ -119,10 +130,11 @@ def interval(table: Table, first: i64, count: i64, x: f64) -> i64:
 @kernel
 def draw_cell8(table: Table, w: i64, h: i64, u: F64x8, v: F64x8) -> CellDraw8:
     """`draw_cell` for eight paths."""
-    row, blocks = interval8(table, splat8i(0), h, v), eights(w)
-    start = row * (EIGHT * blocks) + within_from(w, h)
-    block = interval8(table, row * blocks + (h + 1), blocks, u) * EIGHT
-    column = block + interval8(table, start + block, EIGHT, u)
+    row, coarse, places = interval8(table, splat8i(0), h, v), coarsest(w), places_of(w, h)
+    column = interval8(table, row * coarse + places.every_64th, coarse, u) * 8
+    column = (column + interval8(table, row * (8 * coarse) + column + places.every_8th, 8, u)) * 8
+    start = row * (64 * coarse) + places.every
+    column = column + interval8(table, start + column, 8, u)
     low = gather8d(table, row)
     left = gather8d(table, start + column)
     share, part = gather8d(table, row + 1) - low, gather8d(table, start + column + 1) - left
@@ -133,7 +145,7 @@ def draw_cell8(table: Table, w: i64, h: i64, u: F64x8, v: F64x8) -> CellDraw8:
 @kernel
 def cell_probability8(table: Table, w: i64, h: i64, row: I64x8, column: I64x8) -> F64x8:
     """`cell_probability` for eight paths."""
-    at = row * (EIGHT * eights(w)) + column + within_from(w, h)
+    at = row * (64 * coarsest(w)) + column + places_of(w, h).every
     rows, columns = gather8d(table, row + 1) - gather8d(table, row), gather8d(table, at + 1) - gather8d(table, at)
     return rows * columns
 

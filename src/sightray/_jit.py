@@ -326,11 +326,12 @@ def interrupts_put_off() -> Iterator[None]:
 
 
 def _compile(function: Callable) -> ObjectCode:
-    with _lock, interrupts_put_off():
+    from sightray._codegen import late_code
+
+    with _lock, interrupts_put_off(), late_code():
         dispatcher = _dispatcher(function)
         (result,) = dispatcher.overloads.values()
-        library = result.library
-        module = library._final_module
+        module = result.library.optimized()
         needs = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
         return ObjectCode(result.fndesc.mangled_name, tuple(needs), _machine().emit_object(module))
 

@@ -235,3 +235,21 @@ def test_an_interrupt_while_a_kernel_is_compiled_comes_afterwards():
             pass
     finally:
         signal.signal(signal.SIGINT, earlier)
+
+
+@kernel
+def floor_of(x: f64) -> f64:
+    return np.floor(x) + round(x)
+
+
+def test_other_users_of_numba_are_not_disturbed():
+    """Kernels wait for their machine code until all is together; what others compile meanwhile or afterwards works."""
+    numba = pytest.importorskip("numba")
+    assert native(floor_of)(2.7) == 5.0
+
+    @numba.njit
+    def theirs(x):
+        return np.floor(x) + round(x)
+
+    assert theirs(-0.5) == -1.0
+    assert native(floor_of)(-0.5) == -1.0

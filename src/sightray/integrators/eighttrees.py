@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from sightray._jit import implements, kernel
+from sightray._jit import implements, kernel, method
 from sightray.accelerators.item import ORIENTED, PATTERNED, ItemHit
 from sightray.cameras.base import APART
 from sightray.cameras.base import SPREAD as CAMERA_SPREAD
@@ -118,7 +118,33 @@ assert WHERES + 8 * WHERE_WORDS == 1368  # as `step8` has it
 
 
 class _AmongTrees(PathTracer):
-    """`PathTracer` for scenes whose surfaces are found by a tree."""
+    """`PathTracer` for scenes whose surfaces are found by a tree; all materials have forms for eight paths."""
+
+
+class _AmongOthers(_AmongTrees):
+    """The same for scenes in which some materials have none: a class of its own, so that others need not compile theirs."""
+
+
+@method(3)
+def sample_others(integrator: Table, words: Table, wo: Vec3x8, way: Way8, known: Sample8, bits: i64) -> Sample8:
+    """`sample_of_kinds` for the lanes in `bits`, whose materials are asked one by one; what is known is kept."""
+    raise NotImplementedError
+
+
+@method(4)
+def bsdf_others(integrator: Table, words: Table, wo: Vec3x8, wi: Vec3x8, known: Value8, bits: i64) -> Value8:
+    """`bsdf_of_kinds` for the same."""
+    raise NotImplementedError
+
+
+@implements(sample_others, _AmongTrees)
+def no_other_samples(integrator: Table, words: Table, wo: Vec3x8, way: Way8, known: Sample8, bits: i64) -> Sample8:
+    return known
+
+
+@implements(bsdf_others, _AmongTrees)
+def no_other_values(integrator: Table, words: Table, wo: Vec3x8, wi: Vec3x8, known: Value8, bits: i64) -> Value8:
+    return known
 
 
 @implements(radiance_of_batch, _AmongTrees)
@@ -270,7 +296,7 @@ def step8(
     way = way8(integrator, world, own, event)
     next = sample_of_kinds(kinds_of(world), here, way)
     if alone != 0:
-        next = sample_alone(words, wo, way, next, alone)
+        next = sample_others(integrator, words, wo, way, next, alone)
     onward = go_on8(integrator, next, way, paths.beta, going, event)
 
     # Look for lights.
@@ -280,7 +306,7 @@ def step8(
         wi = into8(frame, lamp.sample.direction)
         answer = bsdf_of_kinds(kinds_of(world), here, wi)
         if alone != 0:
-            answer = bsdf_alone(words, wo, wi, answer, alone)
+            answer = bsdf_others(integrator, words, wo, wi, answer, alone)
         lit = lit_by8(here, lamp, answer, going)
         asked = count_bits(movemask8(lit.asked))
         if asked > 0:
@@ -320,9 +346,8 @@ def on_true_side8(normal: Vec3x8, d: Vec3x8, way: Vec3x8, passes: Mask8) -> Vec3
     return select8v(right, way, way - normal * (2.0 * facing))
 
 
-@kernel
-def sample_alone(words: Table, wo: Vec3x8, way: Way8, known: Sample8, bits: i64) -> Sample8:
-    """`sample_of_kinds` for the materials in `bits`, which have no forms for eight paths; what is known is kept."""
+@implements(sample_others, _AmongOthers)
+def sample_one_by_one(integrator: Table, words: Table, wo: Vec3x8, way: Way8, known: Sample8, bits: i64) -> Sample8:
     mine = scratch(104)
     store8v(mine, 0, wo)
     store8d(mine, 24, way.turn.u)
@@ -343,9 +368,8 @@ def sample_alone(words: Table, wo: Vec3x8, way: Way8, known: Sample8, bits: i64)
     return Sample8(load8v(mine, 48), load8v(mine, 72), load8d(mine, 96))
 
 
-@kernel
-def bsdf_alone(words: Table, wo: Vec3x8, wi: Vec3x8, known: Value8, bits: i64) -> Value8:
-    """`bsdf_of_kinds` for the same."""
+@implements(bsdf_others, _AmongOthers)
+def bsdf_one_by_one(integrator: Table, words: Table, wo: Vec3x8, wi: Vec3x8, known: Value8, bits: i64) -> Value8:
     mine = scratch(80)
     store8v(mine, 0, wo)
     store8v(mine, 24, wi)

@@ -64,11 +64,12 @@ class PathTracer(Integrator):
 
     def for_batches(self, compiled: Any) -> Integrator | None:
         from sightray.integrators.eightpieces import _AmongPieces
-        from sightray.integrators.eighttrees import _AmongTrees
+        from sightray.integrators.eighttrees import _AmongOthers, _AmongTrees
 
         if self.spectral or not compiled.for_eight or type(self).kernels[radiance] is not path_radiance:
             return None
-        return (_AmongPieces if compiled.in_pieces else _AmongTrees)(**self.values())
+        among = _AmongPieces if compiled.in_pieces else _AmongTrees if compiled.all_have_kinds else _AmongOthers
+        return among(**{name: getattr(self, name) for name in PathTracer.given})
 
 
 DEPTH, ROULETTE_DEPTH, LIGHT_SAMPLES, CLAMP, _, BAND_TABLE = PathTracer.offsets()

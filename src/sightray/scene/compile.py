@@ -22,7 +22,7 @@ from sightray.mathlib.transform import IDENTITY, Transform, put_columns
 from sightray.registry import Member
 from sightray.scene import world as world_row
 from sightray.scene.instance import Group, Instance
-from sightray.scene.kinds import are_for_eight, kinds_of, pack_kinds
+from sightray.scene.kinds import are_for_eight, has_kind, kinds_of, pack_kinds
 from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
 from sightray.scene.parallel import core_count
@@ -166,6 +166,11 @@ class Compiled:
     def for_eight(self) -> bool:
         """Whether paths may be followed eight at once: no medium is about."""
         return self.scene.medium is None and are_for_eight(self.items, self._flags())
+
+    @property
+    def all_have_kinds(self) -> bool:
+        """Whether all materials have forms for eight paths."""
+        return all(has_kind(item.material) for item in self.items)
 
     @functools.cached_property
     def in_pieces(self) -> bool:

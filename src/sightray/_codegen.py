@@ -25,6 +25,10 @@ class Library(JITCodeLibrary):
         super()._optimize_final_module()
         return self._final_module
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Not yet; but say how numbers lie in memory."""
+        ll_module.data_layout = self._codegen._data_layout
+
     def _optimize_final_module(self) -> None:
         """Not yet."""
 

@@ -40,7 +40,7 @@ def texture_words(kind: type[Material]) -> list[int]:
     return [word for name, word in kind._layout() if name in children]
 
 
-def has_kind(material: Material) -> bool:
+def has_kind(material: Any) -> bool:
     """Whether a material, or what is beneath, has forms for eight paths."""
     bare = type(material.bare)
     fits = bare.row_words() <= MOST_WORDS and len(texture_words(bare)) <= MOST_TEXTURES

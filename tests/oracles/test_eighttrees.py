@@ -154,6 +154,30 @@ def test_paths_among_pieces_are_the_same_by_trees():
     assert_same(sr.render(scene, tracer, samples=5), sr.render(scene, tracer, samples=5, accelerator="grid"))
 
 
+def test_threads_tiles_and_interruptions_change_nothing(tmp_path):
+    scene, tracer = odd_materials(), sr.PathTracer()
+    scene = scene.replace(camera=scene.camera.resized(70, 40))
+    one = sr.render(scene, tracer, samples=9, threads=1)
+    np.testing.assert_array_equal(sr.render(scene, tracer, samples=9, threads=3), one)
+    state = tmp_path / "state"
+
+    def stop(progress):
+        if progress.stage == "render" and progress.done > 5000:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sr.render(scene, tracer, samples=9, checkpoint=state, progress=stop)
+    np.testing.assert_array_equal(sr.render(scene, tracer, samples=9, checkpoint=state, resume=True), one)
+
+
+def test_pixels_without_a_ray_are_black_and_cost_none():
+    scene = textured_hills().replace(camera=sr.FisheyeCamera(eye=EYE.eye, target=EYE.target, width=40, height=30, fov=120))
+    eight, one = sr.render(scene, sr.PathTracer(), samples=4), one_at_a_time(scene, sr.PathTracer(), samples=4)
+    assert_same(eight, one)
+    assert (np.asarray(one)[0, 0] == 0).all()
+    assert eight.info["rays"] == one.info["rays"]
+
+
 class Derived(sr.PathTracer):
     """Somebody's own tracer, which changes nothing."""
 

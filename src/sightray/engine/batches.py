@@ -92,6 +92,7 @@ def render_batch(
     for k in range(count):
         d, color = vector_at(batch, WAY + k), vector_at(batch, FOUND + k)
         seen = dot(d, d) > 0.0  # see `pixels.look`
+        rays -= 0 if seen else 1
         add_sample(film, i64_at(batch, SPOT + k), color if seen else grey(0.0), f64_at(batch, WEIGHT + k))
     return rays
 

@@ -122,7 +122,28 @@ def odd_materials():
     )  # fmt: skip
 
 
+def shades():
+    """Lamps seen from within a ball, by chance and through translucent shades that are shaded round."""
+    silk = sr.Principled(base_color=(0.9, 0.7, 0.5), roughness=0.5, transmission=0.8, thin_walled=True)
+    move, size = sr.Transform.translate, sr.Transform.scale
+    glow = sr.Lambert(albedo=0.2, emission=(5, 4, 3))
+    lamps = [coarse_ball(3, material=glow, transform=move(x, 0.4, z) @ size(0.25)) for x, z in ((-1, 0), (0.9, -0.6))]
+    cover = coarse_ball(4, material=silk, transform=move(-1, 0.4, 0) @ size(0.6))
+    around = coarse_ball(8, material=sr.Lambert(albedo=0.5), transform=size(5.0))
+    return sr.Scene(around, cover, *lamps, camera=EYE)
+
+
+def two_minds():
+    """A material that chooses, among others that do not, and has no form for eight paths."""
+    mixed = sr.Mix(a=sr.Lambert(albedo=(0.9, 0.1, 0.1)), b=sr.Mirror(), amount=0.5)
+    return sr.Scene(
+        bumpy_mesh(), coarse_ball(5, material=mixed), sr.PointLight(position=(1, 3, 1), intensity=9), camera=EYE
+    )
+
+
 TREES = {
+    "shades": shades,
+    "two minds": two_minds,
     "odd": odd_materials,
     "lamps": room_of_lamps,
     "textures": textured_hills,
@@ -139,7 +160,7 @@ def followed_by(scene, tracer=None, accelerator=None):
 @pytest.mark.parametrize("options", [{}, {"max_depth": 3, "roulette_depth": 0}, {"clamp": 0.3, "light_samples": 3}])
 def test_paths_among_trees_are_the_same_as_one_at_a_time(name, options):
     scene, tracer = TREES[name](), sr.PathTracer(**options)
-    assert followed_by(scene) is (_AmongOthers if name == "odd" else _AmongTrees)
+    assert followed_by(scene) is (_AmongOthers if name in ("odd", "two minds") else _AmongTrees)
     eight, one = sr.render(scene, tracer, samples=5), one_at_a_time(scene, tracer, samples=5)
     assert_same(eight, one)
     assert eight.info["rays"] == pytest.approx(one.info["rays"], rel=2e-3)
@@ -171,7 +192,9 @@ def test_threads_tiles_and_interruptions_change_nothing(tmp_path):
 
 
 def test_pixels_without_a_ray_are_black_and_cost_none():
-    scene = textured_hills().replace(camera=sr.FisheyeCamera(eye=EYE.eye, target=EYE.target, width=40, height=30, fov=120))
+    scene = textured_hills().replace(
+        camera=sr.FisheyeCamera(eye=EYE.eye, target=EYE.target, width=40, height=30, fov=120)
+    )
     eight, one = sr.render(scene, sr.PathTracer(), samples=4), one_at_a_time(scene, sr.PathTracer(), samples=4)
     assert_same(eight, one)
     assert (np.asarray(one)[0, 0] == 0).all()
@@ -205,8 +228,18 @@ def test_what_is_filled_and_what_has_no_forms_is_followed_alone(material):
     assert sr.PathTracer().for_batches(compile_scene(sr.Scene(sr.Sphere(material=material), camera=EYE))) is None
 
 
+class Ghost(sr.Lambert):
+    """A surface that light passes as if it were not there."""
+
+    @property
+    def clear(self):
+        return True
+
+
 def test_media_wavelengths_and_other_tracers_are_followed_alone():
     scene = sr.Scene(sr.Sphere(), camera=EYE, medium=sr.HomogeneousMedium(absorption=1))
     assert sr.PathTracer().for_batches(compile_scene(scene)) is None
     assert sr.PathTracer(spectral=True).for_batches(compile_scene(textured_hills())) is None
+    ghost = sr.Scene(sr.Sphere(material=Ghost()), camera=EYE)
+    assert sr.PathTracer().for_batches(compile_scene(ghost)) is None
     assert sr.Whitted().for_batches(compile_scene(textured_hills())) is None

@@ -101,7 +101,7 @@ class Surface8(NamedTuple):
 
     p: Vec3x8
     lit: Vec3x8  # see `direct.lit_normal`
-    kind: I64x8  # classes of materials; -1 where there is no surface
+    kind: I64x8  # classes of materials; negative where none is to be asked
     material: I64x8  # addresses of their rows
     t_min: F64x8  # for rays that leave from there
     frame: Frame8

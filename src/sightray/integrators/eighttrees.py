@@ -115,6 +115,7 @@ assert MORE + 11 * LINE == 3944  # as `radiance_of_paths` has it
 P, NORMAL, SHADING, LIFTED, SIDE, AXIS_S, AXIS_T, KIND, MATERIAL, ROOMS = 0, 24, 48, 72, 96, 120, 144, 168, 176, 184
 WHERES, WHERE_WORDS = ROOMS + 8 * ROOM, 12
 assert WHERES + 8 * WHERE_WORDS == 1368  # as `step8` has it
+NOTHING, OTHER = -1, -2  # instead of classes: where no surface is, and where the material has no forms for eight paths
 
 
 class _AmongTrees(PathTracer):
@@ -127,7 +128,7 @@ class _AmongOthers(_AmongTrees):
 
 @method(3)
 def sample_others(integrator: Table, words: Table, wo: Vec3x8, way: Way8, known: Sample8, bits: i64) -> Sample8:
-    """`sample_of_kinds` for the lanes in `bits`, whose materials are asked one by one; what is known is kept."""
+    """`sample_of_kinds` for the `OTHER` materials, in the lanes of `bits`, one by one; what is known is kept."""
     raise NotImplementedError
 
 
@@ -233,7 +234,7 @@ def look_up(integrator: Table, world: Table, paths: Table, k: i64, words: Table,
         f64_put(paths, COLOR + 2 * LINE + k, found.z)
     if number & ALONE != 0:
         put_where(advance(words, WHERES + lane * WHERE_WORDS), point.where)
-        i64_put(words, KIND + lane, -2)
+        i64_put(words, KIND + lane, OTHER)
     else:
         i64_put(words, KIND + lane, number & NUMBER)
         if point.flags & PATTERNED != 0:
@@ -266,7 +267,7 @@ def step8(
 ) -> Taken:
     """Go on with eight paths, from number `first` on, where they have met something; see `eightpieces.step8`."""
     words = scratch(1368)
-    store8i(words, KIND, splat8i(-1))
+    store8i(words, KIND, splat8i(NOTHING))
     going = chosen & (load8i(lines, HIT_ITEM + first) >= 0)
     missed, rays = chosen & not8(going), count_bits(movemask8(chosen))
     bits = movemask8(going)
@@ -292,11 +293,11 @@ def step8(
     size = vmax8d(vmax8d(abs8d(p.x), abs8d(p.y)), abs8d(p.z))
     t_min = vmax8d(t, size) * 1e-9
     here = Surface8(p, load8v(words, SIDE), load8i(words, KIND), load8i(words, MATERIAL), t_min, frame, wo)
-    alone = movemask8(here.kind == -2)
+    others = movemask8(here.kind == OTHER)
     way = way8(integrator, world, own, event)
     next = sample_of_kinds(kinds_of(world), here, way)
-    if alone != 0:
-        next = sample_others(integrator, words, wo, way, next, alone)
+    if others != 0:
+        next = sample_others(integrator, words, wo, way, next, others)
     onward = go_on8(integrator, next, way, paths.beta, going, event)
 
     # Look for lights.
@@ -305,8 +306,8 @@ def step8(
         lamp = lamp8(world, here, one_of8(own, k, count), going)
         wi = into8(frame, lamp.sample.direction)
         answer = bsdf_of_kinds(kinds_of(world), here, wi)
-        if alone != 0:
-            answer = bsdf_others(integrator, words, wo, wi, answer, alone)
+        if others != 0:
+            answer = bsdf_others(integrator, words, wo, wi, answer, others)
         lit = lit_by8(here, lamp, answer, going)
         asked = count_bits(movemask8(lit.asked))
         if asked > 0:

@@ -156,6 +156,31 @@ def test_tracers_are_compared_and_absent_ones_named(small, monkeypatch, capsys):
     assert json.loads(json.dumps(bench_rays.as_plain(outcome)))["tracers"][2]["absent"] == "cannot: no tori"
 
 
+def test_whoever_is_measured_has_been_at_work_for_a_while(small, monkeypatch):
+    """So long that threads of others, which wait in circles when they are done, have gone to sleep."""
+    now, calls, ages = [0.0], [], {"first": 0.02, "second": 0.3}
+    monkeypatch.setattr(bench_rays.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(bench_rays, "built", lambda make, case, threads: (make(case, threads), 1.0))
+
+    def tracer(name):
+        def call(o, d):
+            calls.append(name)
+            now[0] += ages[name] + (0.01 if calls[-2:-1] != [name] else 0.0)  # after another one it takes longer
+            return small.scene.intersect(o, d).t, None
+
+        return lambda case, threads: Tracer(name, call, call)
+
+    monkeypatch.setattr(bench_rays, "sightray_tracer", tracer("first"))
+    monkeypatch.setattr(bench_rays, "PEERS", {"second": tracer("second")})
+    first, second = bench_rays.measure(small, True, 1, rounds=3).results
+    for result in (first, second):
+        for kind in small.rays:
+            wanted = len(small.rays[kind][0]) / 1e6 / ages[result.name]
+            assert result.rates[f"{kind} closest"] == pytest.approx(wanted)
+    assert bench_rays.SETTLING == 0.05
+    assert calls[:6] == ["first", "first", "first", "second", "second", "first"]
+
+
 def test_bytes_of_a_triangle(small):
     facts = bench_rays.facts_of(small)
     tree = small.scene.objects[0].tree()

@@ -12,7 +12,17 @@ from sightray._jit import kernel, native
 from sightray.bvh.casting import END, PACKET_WORDS, PRIM, cast_packet, share
 from sightray.bvh.hulls import are_close, extremes
 from sightray.bvh.packets import ROOM_WORDS, SPREAD, any_rays, closest_rays
-from sightray.bvh.triangles import MESH_WORDS, any_triangle, build_mesh, closest_triangle, pack_mesh
+from sightray.bvh.triangles import (
+    LARGE,
+    MESH_WORDS,
+    SIZE,
+    SMALL,
+    TINY,
+    any_triangle,
+    build_mesh,
+    closest_triangle,
+    pack_mesh,
+)
 from sightray.mathlib.lanes import load8, movemask8, push_all8, sort8, splat8
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Space, Table, advance, f64_at, f64_put, i64_at, scratch
@@ -134,11 +144,14 @@ def slivers(rng, n):
     return vertices, np.arange(3 * n).reshape(-1, 3)
 
 
-def test_rays_from_one_place_in_all_directions():
+@pytest.mark.parametrize("size", [TINY, SMALL, LARGE])
+def test_rays_from_one_place_in_all_directions(size):
     """They begin together; among slivers they meet more boxes on their own than their stacks keep for later."""
     rng = np.random.default_rng(7)
     for vertices, faces in (ball(), slivers(rng, 6000)):
         _space, row = packed(vertices, faces)
+        assert row.view(np.int64)[SIZE] == TINY
+        row.view(np.int64)[SIZE] = size
         o = rng.uniform(-1, 1, (400, 1, 3)) * (1 + 1e-6 * rng.normal(size=(400, 16, 1)))
         d = rng.normal(size=(400, 16, 3)) * rng.uniform(0.1, 10, (400, 1, 1))
         d[:200] = d[:200, :1] + 0.3 * d[:200]  # about the same way, but not quite

@@ -17,8 +17,15 @@ import pytest
 import trimesh
 
 import sightray as sr
+from sightray.scene import parallel, queries
 
 INF = np.inf
+
+
+@pytest.fixture(autouse=True)
+def by_packets(monkeypatch):
+    """Few rays go by packets as well, whatever is compiled already."""
+    monkeypatch.setattr(queries, "FEW_RAYS", 0)
 
 
 def norm(a):
@@ -372,6 +379,49 @@ def test_fine_features_far_from_the_origin():
 
 
 # ------------------------------------------------------------------------------------------- threads, memory, Ctrl-C
+
+
+@pytest.mark.parametrize("threads", [1, 2, 7])
+@pytest.mark.parametrize("n", [2049, 8192, 100_000, 278_950, 3_000_001])
+def test_chunks_are_all_rays_and_short_in_the_end(n, threads):
+    chunks = np.array(parallel.chunks_of(n, threads))
+    sizes = np.diff(chunks, axis=1)[:, 0]
+    np.testing.assert_array_equal(chunks[1:, 0], chunks[:-1, 1])
+    assert (chunks[0, 0], chunks[-1, 1]) == (0, n)
+    assert (chunks[:, 0] % 256 == 0).all()
+    assert (np.diff(sizes) <= 0).all()
+    assert sizes.max() <= parallel.MOST
+    assert sizes[-1] <= parallel.LEAST
+    assert (sizes[:-1] >= parallel.LEAST).all()
+    assert sizes[0] == parallel.MOST or n < parallel.SHARE * threads * parallel.MOST
+    assert np.diff(parallel.chunks_of(1000, 2, chunk=300), axis=1).ravel().tolist() == [300, 300, 300, 100]
+
+
+def test_few_rays_do_not_wait_for_packets_to_be_compiled(monkeypatch):
+    """They find the same; and where packets are at hand, they serve few rays as well."""
+    monkeypatch.setattr(queries, "FEW_RAYS", 5000)
+    at_hand = set()
+    monkeypatch.setattr(queries, "is_compiled", at_hand.__contains__)
+    rng = np.random.default_rng(31)
+    o, d = random_rays(rng, 5000)
+    scene = sr.Scene(mesh(*blob(3)), mesh(*blob(3, 0.5)))
+    used = queries.asked(scene)._kernels
+    for ask, by_packets in ((scene.intersect, queries.closest_of_few), (scene.occluded, queries.any_of_few)):
+        few = ask(o[:4999], d[:4999])
+        assert by_packets not in used
+        many = ask(o, d)
+        assert by_packets in used
+        used.clear()
+        at_hand.add(by_packets)
+        again = ask(o[:4999], d[:4999])
+        assert list(used) == [by_packets]
+        for one in (few, again):
+            if ask == scene.intersect:
+                for name in ("t", "primitive", "shape", "item"):
+                    np.testing.assert_array_equal(getattr(one, name), getattr(many, name)[:4999])
+            else:
+                np.testing.assert_array_equal(one, many[:4999])
+        assert 0.1 < np.mean(many.hit if ask == scene.intersect else many) < 0.9
 
 
 def test_threads_do_not_change_anything(big):

@@ -85,7 +85,7 @@ def closest_alone(
     tree: Table, packets: Table, answers: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> None:
     """Nearest hits of the rays `alive`, bits of four packets: fills their answers, and `PRIM`."""
-    board(alive, works, all_lanes, room)
+    board(alive, alive, works, all_lanes, room)
     nodes = table_at(tree, NODES)
     now, due = Bundle(alive, 0), 0
     while now.nodes | now.leaves | due != 0:
@@ -140,7 +140,7 @@ def meet_item(
 @kernel
 def any_alone(tree: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table) -> i64:
     """Which of the rays `alive`, bits of four packets, any item stops."""
-    board(alive, works, all_lanes, room)
+    board(alive, alive, works, all_lanes, room)
     nodes = table_at(tree, NODES)
     now, due, blocked = Bundle(alive, 0), 0, 0
     while now.nodes | now.leaves | due != 0:

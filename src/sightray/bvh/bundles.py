@@ -20,6 +20,7 @@ from sightray.bvh.bvh8 import (
     BOTTOM,
     CHILD,
     LEAF,
+    NODE_FLOATS,
     NODES,
     BoxRay,
     float_at,
@@ -30,6 +31,8 @@ from sightray.bvh.bvh8 import (
 )
 from sightray.bvh.casting import (
     ALONG,
+    BY_Y,
+    BY_Z,
     DIRECTION,
     END,
     END_AT,
@@ -41,6 +44,8 @@ from sightray.bvh.casting import (
     PACKET_WORDS,
     PLANES,
     PRIM,
+    RENAMED_O,
+    SHEAR,
     SIDE,
     SLACK,
     SPEED,
@@ -60,19 +65,27 @@ from sightray.bvh.shared import (
     begin,
     closest_shared,
     many,
-    prefetch_child,
-    prefetch_corners,
 )
+from sightray.bvh.sixteen import prepare_own_shears
 from sightray.bvh.triangles import (
     BLOCK_FLOATS,
     BLOCKS,
+    INDICES,
+    NUMBERS,
+    SIZE,
+    TINY,
+    VERTICES,
+    Shear,
     TriangleRay,
+    corners,
+    decide,
     filter_block,
     meet_triangle,
     shear,
 )
 from sightray.mathlib.lanes import (
     lowest_bit,
+    prefetch,
     splat4,
     splat8,
 )
@@ -125,6 +138,31 @@ def packet_vec3(packet: Table, at: i64) -> Vec3:
     return Vec3(f64_at(packet, at), f64_at(packet, at + 16), f64_at(packet, at + 32))
 
 
+@kernel
+def prefetch_child(nodes: Table, blocks: Table, child: i64) -> None:
+    """Ask for the cache lines that a child will read: four of a node, three of a block."""
+    table = nodes if child < LEAF else blocks
+    at = child * NODE_FLOATS if child < LEAF else (child & (LEAF - 1)) * BLOCK_FLOATS
+    prefetch(table, at)
+    prefetch(table, at + 16)
+    prefetch(table, at + 32)
+    prefetch(table, at + (48 if child < LEAF else 32))
+
+
+@kernel
+def prefetch_corners(mesh: Table, block: i64, maybe: i64) -> None:
+    """Ask for the corners of triangles of a block, two lines each, and for their numbers."""
+    vertices, blocks = table_at(mesh, VERTICES), table_at(mesh, BLOCKS)
+    prefetch(table_at(mesh, NUMBERS), 4 * block)
+    while maybe != 0:
+        at = block * BLOCK_FLOATS + INDICES + lowest_bit(maybe)
+        maybe &= maybe - 1
+        for corner in range(3):
+            vertex = 6 * int_at(blocks, at + 4 * corner)
+            prefetch(vertices, vertex)
+            prefetch(vertices, vertex + 4)
+
+
 class Bundle(NamedTuple):
     """Rays on their way, a bit each."""
 
@@ -133,44 +171,53 @@ class Bundle(NamedTuple):
 
 
 @kernel
-def board(alive: i64, works: Table, all_lanes: Table, room: Table) -> None:
-    """Prepare the rays `alive`: all that boxes need, empty stacks, and the root as what they visit next."""
+def board(alive: i64, alone: i64, works: Table, all_lanes: Table, room: Table) -> None:
+    """Prepare the rays `alive`: all that boxes need, empty stacks, and the root as what those `alone` visit next."""
     for p in range(4):
         if (alive >> (16 * p)) & 0xFFFF != 0:
             cast_alone(advance(works, p * WORK_WORDS), advance(all_lanes, p * LANE_WORDS))
-    for k in range(64):
+    while alone != 0:
+        k = lowest_bit(alone)
+        alone &= alone - 1
         i64_put(room, NEXT + k, 0)
         i64_put(room, TOPS + k, OWN)
-    for k in range(64):
         i64_put(room, STACKS + k * STRIDE + OWN - 1, BOTTOM)
 
 
 @kernel
+def prepare_shears(packets: Table, works: Table, rays: i64) -> None:
+    """Prepare the packets of `rays` for decisions."""
+    for p in range(4):
+        if rays >> (16 * p) & 0xFFFF != 0:
+            prepare_own_shears(advance(packets, p * PACKET_WORDS), advance(works, p * WORK_WORDS))
+
+
+@kernel
 def proceed(mesh: Table, room: Table, now: Bundle, k: i64, key: i64, top: i64) -> Bundle:
-    """Note what ray k visits next and ask for its memory; the root means that nothing is left."""
+    """Note what ray k visits next and ask for its memory, if that is far; the root means that nothing is left."""
     i64_put(room, NEXT + k, key)
     i64_put(room, TOPS + k, top)
     child = key & CHILD
-    prefetch_child(table_at(mesh, NODES), table_at(mesh, BLOCKS), child)
+    if i64_at(mesh, SIZE) != TINY:
+        prefetch_child(table_at(mesh, NODES), table_at(mesh, BLOCKS), child)
     leaf = child >> 30
     node = 1 - leaf if child != 0 else 0
     return Bundle(now.nodes | node << k, now.leaves | leaf << k)
 
 
 @kernel
-def part(mesh: Table, rays: i64, sorted: bool, all_lanes: Table, room: Table) -> Bundle:
-    """What rays that were on their way together visit first when each goes its own way; maybe what is nearest."""
+def part(mesh: Table, owners: i64, sorted: bool, all_lanes: Table, room: Table) -> Bundle:
+    """What rays with something on their own stacks visit first when each goes its own way; maybe what is nearest."""
     now = Bundle(0, 0)
-    while rays != 0:
-        k = lowest_bit(rays)
-        rays &= rays - 1
+    while owners != 0:
+        k = lowest_bit(owners)
+        owners &= owners - 1
         lowest, stack = i64_at(room, TOPS + k), advance(room, STACKS + k * STRIDE)
-        if lowest < OWN:
-            i64_put(stack, lowest - 1, BOTTOM)
-            if sorted:
-                nearest_on_top(stack, lowest)
-            next = pop_near(stack, OWN, float_at(advance(all_lanes, (k >> 4) * LANE_WORDS), END_AT + (k & 15)))
-            now = proceed(mesh, room, now, k, next.key, next.top)
+        i64_put(stack, lowest - 1, BOTTOM)
+        if sorted:
+            nearest_on_top(stack, lowest)
+        next = pop_near(stack, OWN, float_at(advance(all_lanes, (k >> 4) * LANE_WORDS), END_AT + (k & 15)))
+        now = proceed(mesh, room, now, k, next.key, next.top)
     return now
 
 
@@ -190,14 +237,15 @@ def closest_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
     """`closest_rays` for the rays `alive`, together where many meet the same, and then each on its own."""
-    board(alive, works, all_lanes, room)
     together = many(mesh, alive, all_lanes)
-    crowd = Crowd(scratch(ALL_PAIRS), scratch(24), advance(room, STACKS), advance(room, TOPS))
-    halt = Halt(begin(packets, works, together, crowd), 0)
+    board(alive, alive & ~together, works, all_lanes, room)
+    crowd = Crowd(scratch(ALL_PAIRS), scratch(4), advance(room, STACKS), advance(room, TOPS))
+    prepare_shears(packets, works, alive)
+    halt = Halt(begin(together, crowd), 0, 0)
     found = closest_apart(mesh, packets, t_min, Bundle(alive & ~together, 0), 0, works, all_lanes, room)
     while halt.going != 0:
-        halt = closest_shared(mesh, packets, t_min, works, all_lanes, crowd, Halt(halt.going, found))
-        now = part(mesh, together, True, all_lanes, room)
+        halt = closest_shared(mesh, packets, t_min, works, all_lanes, crowd, Halt(halt.going, found, 0))
+        now = part(mesh, halt.owners, True, all_lanes, room)
         found = closest_apart(mesh, packets, t_min, now, halt.met, works, all_lanes, room)
     return found
 
@@ -229,7 +277,8 @@ def closest_apart(
             block = i64_at(room, NEXT + k) & (LEAF - 1)
             maybe = filter_block(blocks, block * BLOCK_FLOATS, triangle_ray_of(lanes, k & 15), reach).maybe
             if maybe != 0:  # to be decided when the corners are there
-                prefetch_corners(mesh, block, maybe)
+                if i64_at(mesh, SIZE) != TINY:
+                    prefetch_corners(mesh, block, maybe)
                 i64_put(room, WAITING + k, maybe)
                 due |= 1 << k
             else:
@@ -241,22 +290,38 @@ def closest_apart(
             deciding &= deciding - 1
             stack, top = advance(room, STACKS + k * STRIDE), i64_at(room, TOPS + k)
             lanes = advance(all_lanes, (k >> 4) * LANE_WORDS)
-            packet, work = advance(packets, lane_of(k)), advance(works, work_of(k))
-            found |= (1 if decide(mesh, packet, work, lanes, room, k, t_min, found >> k & 1 != 0) else 0) << k
+            packet = advance(packets, lane_of(k))
+            found |= (1 if meet_waiting(mesh, packet, works, lanes, room, k, t_min, found >> k & 1 != 0) else 0) << k
             next = pop_near(stack, top, float_at(lanes, END_AT + (k & 15)))
             now = proceed(mesh, room, now, k, next.key, next.top)
     return found
 
 
 @kernel
-def decide(mesh: Table, packet: Table, work: Table, lanes: Table, room: Table, k: i64, t_min: f64, found: bool) -> bool:
+def shear_of(works: Table, k: i64) -> Shear:
+    """`triangles.shear` of ray k, after `prepare_own_shears`."""
+    of_packet, work = advance(works, (k >> 4) * WORK_WORDS), advance(works, work_of(k))
+    by_z, by_y = i64_at(of_packet, BY_Z) >> (k & 15) & 1, i64_at(of_packet, BY_Y) >> (k & 15) & 1
+    kz = 2 if by_z != 0 else by_y
+    kx = 0 if kz == 2 else kz + 1
+    return Shear(kx, 3 - kx - kz, kz, f64_at(work, SHEAR), f64_at(work, SHEAR + 16), f64_at(work, SHEAR + 32))
+
+
+@kernel
+def meet_waiting(
+    mesh: Table, packet: Table, works: Table, lanes: Table, room: Table, k: i64, t_min: f64, found: bool
+) -> bool:  # fmt: skip
     """Meet ray k with the triangles that wait for it, and note what is nearer; whether it has met any so far."""
     block, waiting = i64_at(room, NEXT + k) & (LEAF - 1), i64_at(room, WAITING + k)
-    o, d = packet_vec3(packet, ORIGIN), packet_vec3(packet, DIRECTION)
-    s = shear(d)
+    vertices, blocks, work = table_at(mesh, VERTICES), table_at(mesh, BLOCKS), advance(works, work_of(k))
+    ox, oy, oz = f64_at(work, RENAMED_O), f64_at(work, RENAMED_O + 16), f64_at(work, RENAMED_O + 32)
+    s = shear_of(works, k)
     while waiting != 0:
-        hit = meet_triangle(mesh, block, lowest_bit(waiting), o, s, t_min, math.inf)
+        lane = lowest_bit(waiting)
         waiting &= waiting - 1
+        at, number = block * BLOCK_FLOATS + INDICES + lane, int_at(table_at(mesh, NUMBERS), 4 * block + lane)
+        x, y = corners(vertices, blocks, at, s.kx) - ox, corners(vertices, blocks, at, s.ky) - oy
+        hit = decide(number, x, y, corners(vertices, blocks, at, s.kz) - oz, s, t_min, math.inf)
         end = f64_at(packet, END)
         # Of two triangles at the same place, the one with the smaller number counts.
         if hit.t < end or (found and hit.t == end and hit.prim < int(f64_at(packet, PRIM))):
@@ -273,14 +338,15 @@ def any_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
     """`any_rays` for the rays `alive`, together where many meet the same, and then each on its own."""
-    board(alive, works, all_lanes, room)
     together = many(mesh, alive, all_lanes)
-    crowd = Crowd(scratch(ALL_PAIRS), scratch(24), advance(room, STACKS), advance(room, TOPS))
-    halt = Halt(begin(packets, works, together, crowd), 0)
+    board(alive, alive & ~together, works, all_lanes, room)
+    crowd = Crowd(scratch(ALL_PAIRS), scratch(4), advance(room, STACKS), advance(room, TOPS))
+    prepare_shears(packets, works, together)
+    halt = Halt(begin(together, crowd), 0, 0)
     blocked = any_apart(mesh, packets, t_min, Bundle(alive & ~together, 0), 0, all_lanes, room)
     while halt.going != 0:
-        halt = any_shared(mesh, packets, t_min, works, all_lanes, crowd, Halt(halt.going, blocked))
-        now = part(mesh, together & ~halt.met, False, all_lanes, room)
+        halt = any_shared(mesh, packets, t_min, works, all_lanes, crowd, Halt(halt.going, blocked, 0))
+        now = part(mesh, halt.owners, False, all_lanes, room)
         blocked = any_apart(mesh, packets, t_min, now, halt.met, all_lanes, room)
     return blocked
 

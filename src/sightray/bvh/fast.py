@@ -128,7 +128,7 @@ def fast_in_turns(
     mesh: Table, packets: Table, t_min: f64, alive: i64, works: Table, all_lanes: Table, room: Table
 ) -> i64:
     """`closest_in_turns`, but what the filter finds is final, so that nothing waits for corners."""
-    board(alive, works, all_lanes, room)
+    board(alive, alive, works, all_lanes, room)
     nodes, blocks = table_at(mesh, NODES), table_at(mesh, BLOCKS)
     now, found = Bundle(alive, 0), 0
     while now.nodes | now.leaves != 0:

@@ -2,8 +2,8 @@
 
 Rays that leave from about the same place all meet the boxes around it, whatever their directions. So a packet whose rays
 go each on its own (see `bundles`) begins together: a node that at least `SHARED` of its rays meet is visited once for all
-of them, and so is a leaf. What fewer meet waits on these rays' own stacks. Boxes, filter and decision are those of single
-rays, so the hits are the same.
+of them, and so is a leaf that `SHARED_LEAF` meet. What fewer meet waits on these rays' own stacks. Boxes, filter and
+decision are those of single rays, so the hits are the same.
 
 Reference: C. Benthin, I. Wald, S. Woop, M. Ernst, W. Mark, "Combining single and packet-ray tracing for arbitrary ray
 distributions on the Intel MIC architecture" (2012).
@@ -23,9 +23,8 @@ from sightray.bvh.sixteen import (
     filter_triangle,
     keep_decided,
     lanes_at,
-    prepare_own_shears,
 )
-from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, INDICES, NUMBERS, SMALL, VERTICES
+from sightray.bvh.triangles import BLOCK_FLOATS, BLOCKS, INDICES, LARGE, NUMBERS, SIZE
 from sightray.mathlib.lanes import (
     F32x16,
     Mask16,
@@ -35,7 +34,6 @@ from sightray.mathlib.lanes import (
     load16d,
     lowest_bit,
     movemask16,
-    prefetch,
     select16,
     splat16,
     splat16d,
@@ -46,37 +44,12 @@ from sightray.mathlib.lanes import (
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, i64_at, i64_put, scratch, table_at
 
-SHARED = 8  # rays that are worth a visit of all sixteen
+SHARED, SHARED_LEAF = 8, 4  # rays for which a visit of all sixteen is worth it, to a node and to a leaf
 PLACE = 0.06  # in the unit frame: rays that begin no farther apart begin together
 PAIRS = 2 * STACK_WORDS  # words of the stack of a packet: two for each node
 ALL_PAIRS = 4 * PAIRS
 OWN = 64  # words of a ray's own stack for what it does not share; the rest is for what lies below that
 STRIDE = OWN + STACK_WORDS + 8  # from stack to stack; one line more, lest all begin in the same set of the cache
-
-
-@kernel
-def prefetch_child(nodes: Table, blocks: Table, child: i64) -> None:
-    """Ask for the cache lines that a child will read: four of a node, three of a block."""
-    table = nodes if child < LEAF else blocks
-    at = child * NODE_FLOATS if child < LEAF else (child & (LEAF - 1)) * BLOCK_FLOATS
-    prefetch(table, at)
-    prefetch(table, at + 16)
-    prefetch(table, at + 32)
-    prefetch(table, at + (48 if child < LEAF else 32))
-
-
-@kernel
-def prefetch_corners(mesh: Table, block: i64, maybe: i64) -> None:
-    """Ask for the corners of triangles of a block, two lines each, and for their numbers."""
-    vertices, blocks = table_at(mesh, VERTICES), table_at(mesh, BLOCKS)
-    prefetch(table_at(mesh, NUMBERS), 4 * block)
-    while maybe != 0:
-        at = block * BLOCK_FLOATS + INDICES + lowest_bit(maybe)
-        maybe &= maybe - 1
-        for corner in range(3):
-            vertex = 6 * int_at(blocks, at + 4 * corner)
-            prefetch(vertices, vertex)
-            prefetch(vertices, vertex + 4)
 
 
 class PacketRay(NamedTuple):
@@ -140,12 +113,13 @@ def meet_children(nodes: Table, at: i64, ray: PacketRay, bits: i64, reach: F32x1
     """Meet the boxes of a node with the rays `bits`. Rows of nine words are written, a child each: bits, and lengths."""
     shared, own = 0, 0
     for lane in range(8):
-        box = meet_box(nodes, at + lane, ray, reach)
+        box, child = meet_box(nodes, at + lane, ray, reach), int_at(nodes, at + CHILDREN + lane)
         met = movemask16(box.met) & bits
         i64_put(found, 9 * lane, met)
         store16(found, 18 * lane + 2, box.near)
-        shared |= (1 if count_bits(met) >= SHARED else 0) << lane
-        own |= (1 if 0 < count_bits(met) < SHARED else 0) << lane
+        many = count_bits(met) >= (SHARED if child < LEAF else SHARED_LEAF)
+        shared |= (1 if many else 0) << lane
+        own |= (1 if met != 0 and not many else 0) << lane
     return Children(shared, own)
 
 
@@ -155,14 +129,22 @@ def key_of(found: Table, lane: i64, k: i64, code: i64) -> i64:
     return int_at(found, 18 * lane + 2 + k) << 32 | code
 
 
+class Pushed(NamedTuple):
+    """What was put on rays' own stacks."""
+
+    rays: i64  # whose, a bit each
+    lowest: i64  # place that is taken
+
+
 @kernel
-def push_own(nodes: Table, at: i64, found: Table, own: i64, tops: Table, stacks: Table) -> i64:
-    """Put children below what is on the stacks of the rays that meet them; the lowest place that is taken."""
-    lowest = OWN
+def push_own(nodes: Table, at: i64, found: Table, own: i64, tops: Table, stacks: Table) -> Pushed:
+    """Put children below what is on the stacks of the rays that meet them."""
+    lowest, rays = OWN, 0
     while own != 0:
         lane = lowest_bit(own)
         own &= own - 1
         met, code = i64_at(found, 9 * lane), int_at(nodes, at + CHILDREN + lane)
+        rays |= met
         while met != 0:
             k = lowest_bit(met)
             met &= met - 1
@@ -170,7 +152,7 @@ def push_own(nodes: Table, at: i64, found: Table, own: i64, tops: Table, stacks:
             i64_put(stacks, k * STRIDE + place, key_of(found, lane, k, code))
             i64_put(tops, k, place)
             lowest = min(lowest, place)
-    return lowest
+    return Pushed(rays, lowest)
 
 
 @kernel
@@ -197,7 +179,7 @@ def push_shared(nodes: Table, at: i64, found: Table, shared: i64, stack: Table, 
 def many(mesh: Table, alive: i64, all_lanes: Table) -> i64:
     """Of the rays `alive`, bits of four packets, those that had better begin together: many, from about the same place."""
     bits = 0
-    if i64_at(mesh, SMALL) == 0:
+    if i64_at(mesh, SIZE) == LARGE:
         return bits
     for p in range(4):
         its = alive & 0xFFFF << (16 * p)
@@ -221,7 +203,7 @@ class Crowd(NamedTuple):
     """Four packets on their way together, and their rays' own stacks."""
 
     stacks: Table  # of the packets
-    states: Table  # how high these are, and what waits for a decision: six words for each packet
+    tops: Table  # how high these are
     own_stacks: Table
     own_tops: Table
 
@@ -231,105 +213,86 @@ class Halt(NamedTuple):
 
     going: i64  # packets that have to go on when their rays' own stacks are empty again, a bit each
     met: i64  # rays that have met a triangle
+    owners: i64  # rays with something on their own stacks
 
 
 @kernel
-def begin(packets: Table, works: Table, rays: i64, crowd: Crowd) -> i64:
+def begin(rays: i64, crowd: Crowd) -> i64:
     """Let the packets of `rays` begin at the root; a bit for each."""
     going = 0
     for p in range(4):
         bits = (rays >> (16 * p)) & 0xFFFF
         if bits != 0:
-            prepare_own_shears(advance(packets, p * PACKET_WORDS), advance(works, p * WORK_WORDS))
             i64_put(crowd.stacks, p * PAIRS, 0)
             i64_put(crowd.stacks, p * PAIRS + 1, bits)
-            i64_put(crowd.states, 6 * p, 1)
+            i64_put(crowd.tops, p, 1)
             going |= 1 << p
     return going
 
 
+class Visited(NamedTuple):
+    """What a packet leaves behind at a node."""
+
+    top: i64  # the height of its stack
+    room: bool  # whether there is room on its rays' own stacks for another one
+    owners: i64  # rays with something on their own stacks
+
+
 @kernel
 def visit_shared(
-    mesh: Table, child: i64, bits: i64, lanes: Table, p: i64, sorted: bool, crowd: Crowd, found: Table
-) -> bool:  # fmt: skip
-    """Visit a node with the rays `bits` of packet p; whether there is room on their stacks for another one."""
+    mesh: Table, child: i64, bits: i64, lanes: Table, p: i64, now: Visited, sorted: bool, crowd: Crowd, found: Table
+) -> Visited:  # fmt: skip
+    """Visit a node with the rays `bits` of packet p."""
     nodes, at, stack = table_at(mesh, NODES), child * NODE_FLOATS, advance(crowd.stacks, p * PAIRS)
     children = meet_children(nodes, at, packet_ray(lanes), bits, load16(lanes, END_AT), found)
     own_tops, own_stacks = advance(crowd.own_tops, 16 * p), advance(crowd.own_stacks, 16 * p * STRIDE)
-    lowest = push_own(nodes, at, found, children.own, own_tops, own_stacks)
-    i64_put(
-        crowd.states, 6 * p, push_shared(nodes, at, found, children.shared, stack, i64_at(crowd.states, 6 * p), sorted)
-    )
-    return lowest > 8
+    pushed = push_own(nodes, at, found, children.own, own_tops, own_stacks)
+    top = push_shared(nodes, at, found, children.shared, stack, now.top, sorted)
+    return Visited(top, pushed.lowest > 8, now.owners | pushed.rays)
 
 
 @kernel
-def go_on(mesh: Table, crowd: Crowd, p: i64) -> bool:
-    """Ask for what packet p visits next; whether there is anything."""
-    top = i64_at(crowd.states, 6 * p)
-    if top > 0:
-        child = i64_at(crowd.stacks, p * PAIRS + 2 * top - 2) & CHILD
-        prefetch_child(table_at(mesh, NODES), table_at(mesh, BLOCKS), child)
-    return top > 0
+def ahead(crowd: Crowd, halt: Halt, p: i64) -> Visited:
+    """What lies ahead of packet p."""
+    return Visited(i64_at(crowd.tops, p) if halt.going >> p & 1 != 0 else 0, True, 0)
 
 
 @kernel
 def closest_shared(
     mesh: Table, packets: Table, t_min: f64, works: Table, all_lanes: Table, crowd: Crowd, halt: Halt
 ) -> Halt:
-    """Visit what many rays of packets meet."""
-    found, open, due, waiting, met = scratch(72), halt.going, 0, 0, halt.met
+    """Visit what many rays of packets meet, one packet after the other: all is in near caches."""
+    found, waiting, met, owners = scratch(72), 0, halt.met, 0
     empty_stacks(crowd)
-    while open != 0:
-        turn = open
-        while turn != 0:
-            p = lowest_bit(turn)
-            turn &= turn - 1
-            lanes, state, room = advance(all_lanes, p * LANE_WORDS), advance(crowd.states, 6 * p), True
-            if due >> p & 1 != 0:
+    for p in range(4):
+        lanes, now = advance(all_lanes, p * LANE_WORDS), ahead(crowd, halt, p)
+        while now.top > 0 and now.room:
+            now = Visited(now.top - 1, True, now.owners)
+            entry = p * PAIRS + 2 * now.top
+            child, bits = i64_at(crowd.stacks, entry) & CHILD, i64_at(crowd.stacks, entry + 1)
+            if child < LEAF:
+                now = visit_shared(mesh, child, bits, lanes, p, now, True, crowd, found)
+            else:
                 packet, work = advance(packets, p * PACKET_WORDS), advance(works, p * WORK_WORDS)
                 its = (met >> (16 * p)) & 0xFFFF
-                met |= decide_block(mesh, packet, work, lanes, state, t_min, its) << (16 * p)
-                due &= ~(1 << p)
-            else:
-                top = i64_at(state, 0) - 1
-                entry = p * PAIRS + 2 * top
-                child, bits = i64_at(crowd.stacks, entry) & CHILD, i64_at(crowd.stacks, entry + 1)
-                i64_put(state, 0, top)
-                if child < LEAF:
-                    room = visit_shared(mesh, child, bits, lanes, p, True, crowd, found)
-                elif filter_shared(mesh, child & (LEAF - 1), bits, lanes, state):
-                    due |= 1 << p  # to be decided when the corners are there
-                    continue
-            more = go_on(mesh, crowd, p)
-            if not (more and room):
-                open &= ~(1 << p)
-                waiting |= (1 if more else 0) << p
-    return Halt(waiting, met)
+                met |= closest_in_block(mesh, packet, work, lanes, child & (LEAF - 1), bits, t_min, its) << (16 * p)
+        i64_put(crowd.tops, p, now.top)
+        waiting |= (1 if now.top > 0 else 0) << p
+        owners |= now.owners << (16 * p)
+    return Halt(waiting, met, owners)
 
 
 @kernel
-def filter_shared(mesh: Table, block: i64, bits: i64, lanes: Table, state: Table) -> bool:
-    """Note which of the rays `bits` of a packet may meet the triangles of a block; whether any may."""
-    blocks, at, sizes, some = table_at(mesh, BLOCKS), block * BLOCK_FLOATS, scratch(2), 0
+def closest_in_block(
+    mesh: Table, packet: Table, work: Table, lanes: Table, block: i64, bits: i64, t_min: f64, found: i64
+) -> i64:  # fmt: skip
+    """Meet the rays `bits` of a packet with the triangles of a block; `found`, who has met any, with those that do now."""
+    blocks, at, sizes = table_at(mesh, BLOCKS), block * BLOCK_FLOATS, scratch(2)
     edge_sizes(blocks, at, sizes)
-    i64_put(state, 1, block)
     for lane in range(4):
         maybe = filter_triangle(blocks, at + lane, float_at(sizes, lane), lanes).maybe & bits
-        i64_put(state, 2 + lane, maybe)
-        some |= (1 if maybe != 0 else 0) << lane
-    prefetch_corners(mesh, block, some)
-    return some != 0
-
-
-@kernel
-def decide_block(mesh: Table, packet: Table, work: Table, lanes: Table, state: Table, t_min: f64, found: i64) -> i64:
-    """Meet the rays of a packet with the triangles that wait for them; `found`, who has met any, with those that do now."""
-    block = i64_at(state, 1)
-    for lane in range(4):
-        maybe = i64_at(state, 2 + lane)
         if maybe != 0:
-            t = decide_for_each(mesh, work, block * BLOCK_FLOATS + INDICES + lane)
+            t = decide_for_each(mesh, work, at + lane + INDICES)
             prim = int_at(table_at(mesh, NUMBERS), 4 * block + lane)
             found |= keep_decided(packet, work, lanes, t, prim, t_min, maybe, found)
     return found
@@ -347,27 +310,23 @@ def any_shared(
     mesh: Table, packets: Table, t_min: f64, works: Table, all_lanes: Table, crowd: Crowd, halt: Halt
 ) -> Halt:
     """Visit what many rays of packets meet, until they are stopped."""
-    found, open, waiting, stopped = scratch(72), halt.going, 0, halt.met
+    found, waiting, stopped, owners = scratch(72), 0, halt.met, 0
     empty_stacks(crowd)
-    while open != 0:
-        turn = open
-        while turn != 0:
-            p = lowest_bit(turn)
-            turn &= turn - 1
-            top, room = i64_at(crowd.states, 6 * p) - 1, True
-            entry, lanes = p * PAIRS + 2 * top, advance(all_lanes, p * LANE_WORDS)
+    for p in range(4):
+        lanes, now = advance(all_lanes, p * LANE_WORDS), ahead(crowd, halt, p)
+        while now.top > 0 and now.room:
+            now = Visited(now.top - 1, True, now.owners)
+            entry = p * PAIRS + 2 * now.top
             child, bits = i64_at(crowd.stacks, entry) & CHILD, i64_at(crowd.stacks, entry + 1) & ~(stopped >> (16 * p))
-            i64_put(crowd.states, 6 * p, top)
             if bits != 0 and child < LEAF:
-                room = visit_shared(mesh, child, bits, lanes, p, False, crowd, found)
+                now = visit_shared(mesh, child, bits, lanes, p, now, False, crowd, found)
             elif bits != 0:
                 packet, work = advance(packets, p * PACKET_WORDS), advance(works, p * WORK_WORDS)
                 stopped |= any_in_block(mesh, packet, work, lanes, child & (LEAF - 1), bits, t_min) << (16 * p)
-            more = go_on(mesh, crowd, p)
-            if not (more and room):
-                open &= ~(1 << p)
-                waiting |= (1 if more else 0) << p
-    return Halt(waiting, stopped)
+        i64_put(crowd.tops, p, now.top)
+        waiting |= (1 if now.top > 0 else 0) << p
+        owners |= now.owners << (16 * p)
+    return Halt(waiting, stopped, owners & ~stopped)
 
 
 @kernel

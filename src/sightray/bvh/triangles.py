@@ -84,9 +84,10 @@ BLOCKS = TREE_WORDS  # pointer to the blocks
 NUMBERS = TREE_WORDS + 1  # pointer to the numbers of the triangles in the blocks: int32
 VERTICES = TREE_WORDS + 2  # pointer to float64 x, y, z
 FACES = TREE_WORDS + 3  # pointer to three int32 a triangle
-SMALL = TREE_WORDS + 4  # whether rays that leave from one place had better begin together (see `shared`)
+SIZE = TREE_WORDS + 4  # `TINY`, `SMALL` or `LARGE`
 MESH_WORDS = TREE_WORDS + 5
-MOST_BLOCKS = 1 << 16  # of a mesh for that: larger ones wait for memory, which rays in turns do not mind
+TINY, SMALL, LARGE = 0, 1, 2  # trees that near caches hold; that farther ones hold; that rays wait for memory in
+TINY_BLOCKS, SMALL_BLOCKS = 1 << 13, 1 << 16  # that these have at most
 
 
 class MeshTree(NamedTuple):
@@ -126,7 +127,8 @@ def pack_mesh(space: Space, row: Table, mesh: MeshTree) -> None:
     link(row, NUMBERS, space.array(mesh.numbers))
     link(row, VERTICES, space.array(mesh.vertices))
     link(row, FACES, space.array(mesh.faces))
-    row.view(np.int64)[SMALL] = len(mesh.blocks) <= MOST_BLOCKS
+    blocks = len(mesh.blocks)
+    row.view(np.int64)[SIZE] = TINY if blocks <= TINY_BLOCKS else SMALL if blocks <= SMALL_BLOCKS else LARGE
 
 
 # ------------------------------------------------------------------------------------------------------------ building

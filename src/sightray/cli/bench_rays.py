@@ -1,9 +1,11 @@
 """``sightray bench rays``: rays each second against other ray tracers, on the same scenes, rays and cores, in one run.
 
 What is traced stands in `bench_cases`, who traces in `bench_peers`. Tracers take part in turns (A B A B), and medians are
-compared. *Building* is all from arrays to the answer of a first ray; for Embree (Open3D, embreex) that is
-`add_triangles` and what the first ray sets off, the scene's commit. *Agreement* is the share of rays of which a tracer
-says, as this library does in double precision, that they hit or that they miss.
+compared. Each is at work for a while before it is measured (`SETTLING`): when their work is done, threads of some libraries
+wait in circles for up to that long, and take the cores of whoever is next. *Building* is all from arrays to the answer of a
+first ray; for Embree (Open3D, embreex) that is `add_triangles` and what the first ray sets off, the scene's commit.
+*Agreement* is the share of rays of which a tracer says, as this library does in double precision, that they hit or that
+they miss.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from sightray.cli.bench_peers import PEERS, Cast, Tracer, Unable, sightray_trace
 
 ROUNDS = 7
 BUILDS = 3  # of the trees of meshes
+SETTLING = 0.05  # seconds
 FAR = 1e30  # t beyond which there is no hit, whatever a tracer means by infinite
 
 
@@ -46,6 +49,14 @@ def seconds(call: Cast, o: np.ndarray, d: np.ndarray) -> float:
     start = time.perf_counter()
     call(o, d)
     return time.perf_counter() - start
+
+
+def settled_seconds(call: Cast, o: np.ndarray, d: np.ndarray) -> float:
+    """How long one call takes when nobody else is at work any more."""
+    spent = 0.0
+    while spent < SETTLING:
+        spent += seconds(call, o, d)
+    return seconds(call, o, d)
 
 
 def built(make: Any, case: Case, threads: int) -> tuple[Tracer, float]:
@@ -78,16 +89,14 @@ def measure(case: Case, peers: bool, threads: int, rounds: int = ROUNDS) -> Outc
         except Exception as reason:
             absent.append(Result(name, {}, absent=f"{type(reason).__name__}: {reason}".splitlines()[0][:100]))
 
-    # In turns, so that what else the machine does meets all alike; the first round warms up.
+    # In turns, so that what else the machine does meets all alike.
     questions = [f"{kind} {verb}" for verb in ("closest", "any") for kind in case.rays]
     times: dict[tuple[str, str], list[float]] = {(t.name, q): [] for t in tracers for q in questions}
-    for turn in range(rounds + 1):
+    for _ in range(rounds):
         for question in questions:
             kind, verb = question.rsplit(" ", 1)
             for tracer in tracers:
-                spent = seconds(getattr(tracer, verb), *case.rays[kind])
-                if turn > 0:
-                    times[tracer.name, question].append(spent)
+                times[tracer.name, question].append(settled_seconds(getattr(tracer, verb), *case.rays[kind]))
     truth = {kind: hit_of(tracers[0].closest(o, d)) for kind, (o, d) in case.rays.items()}
     results = []
     for tracer in tracers:
@@ -118,11 +127,13 @@ def facts_of(case: Case) -> dict[str, Any]:
 def warm_up(threads: int) -> None:
     """Have the kernels compiled that build trees and trace, lest that be measured."""
     import sightray as sr
+    from sightray.scene.queries import FEW_RAYS
 
     vertices, faces = icosphere(2)
     scene = sr.Scene(sr.Mesh(vertices=vertices, faces=faces))
-    scene.intersect((0, 0, 3), (0, 0, -1), threads=threads)
-    scene.occluded((0, 0, 3), (0, 0, -1), threads=threads)
+    o, d = np.full((FEW_RAYS, 3), (0.0, 0.0, 3.0)), (0.0, 0.0, -1.0)
+    scene.intersect(o, d, threads=threads)
+    scene.occluded(o, d, threads=threads)
 
 
 def rays(peers: bool, json: bool, case: str = "balls", threads: int | None = None, rounds: int = ROUNDS) -> None:

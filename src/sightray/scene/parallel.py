@@ -13,7 +13,7 @@ import numpy as np
 from sightray.mathlib.table import Table, aligned
 
 FEW = 2048  # rays that are not worth waking a thread: a tenth of a millisecond
-CHUNKS = 16  # for each thread, so that all end at about the same time
+SHARE = 3  # a chunk takes one part in so many, for each thread, of what is left: short ones so that all end together
 LEAST, MOST = 8192, 32768  # rays of a chunk: many, lest Python have much to do; few enough to be converted in passing
 POLL = 0.1  # seconds between looks at the keyboard
 
@@ -47,6 +47,16 @@ def _start(helpers: int, work: Callable[[], None]) -> list[Future]:
         return [_pool.submit(work) for _ in range(helpers)]
 
 
+def chunks_of(n: int, threads: int, chunk: int = 0) -> list[tuple[int, int]]:
+    """First and last of the rays of each chunk; all begin at multiples of 256, because kernels take as many at a time."""
+    chunks, first = [], 0
+    while first < n:
+        size = chunk or min(max((n - first) // (SHARE * threads), LEAST), MOST) // 256 * 256
+        chunks.append((first, min(first + size, n)))
+        first += size
+    return chunks
+
+
 def run_chunks(n: int, work: Callable[[int, int, Table], None], threads: int | None = None, chunk: int = 0) -> None:
     """Call ``work(first, last, stop)`` for all chunks of n rays, on several threads.
 
@@ -59,16 +69,15 @@ def run_chunks(n: int, work: Callable[[int, int, Table], None], threads: int | N
         return
     stop = Table(aligned(1, np.int64))
     threads = core_count() if threads is None else threads
-    chunk = chunk or min(max(n // (CHUNKS * threads), LEAST), MOST) // 256 * 256  # kernels take 256 rays at a time
-    chunks = -(-n // chunk)
-    helpers = min(threads, chunks) - 1
+    chunks = chunks_of(n, threads, chunk)
+    helpers = min(threads, len(chunks)) - 1
     queue = itertools.count()
     word = stop.view(np.int64)
 
     def take() -> None:
         try:
-            while word[0] == 0 and (first := chunk * next(queue)) < n:
-                work(first, min(first + chunk, n), stop)
+            while word[0] == 0 and (number := next(queue)) < len(chunks):
+                work(*chunks[number], stop)
         except BaseException:
             word[0] = 1
             raise

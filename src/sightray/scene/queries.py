@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sightray._jit import native
+from sightray._jit import is_compiled, native
 from sightray.accelerators.bvh import pack_items
 from sightray.accelerators.item import CUTOUT
 from sightray.accelerators.item_packets import ITEM_ROOM_WORDS
@@ -29,6 +29,7 @@ from sightray.scene.world import FLAGS, ITEMS
 from sightray.shapes.mesh import Mesh
 
 PRECISIONS = ("exact", "fast")
+FEW_RAYS = 1 << 13  # fewer are not worth ten seconds for compiling packets, once, but take them if they are at hand
 MANY_RAYS = 1 << 15  # that are worth the seconds which compiling packets for many items takes, once
 
 
@@ -58,15 +59,16 @@ class Asked:
 
     def closest(self, n: int, precision: str) -> Callable:
         """The kernel for the nearest hits of n rays, with its scene: by packets where that is worth it."""
-        if self.packets:
-            return self.with_room(fast_of_few if precision == "fast" else closest_of_few, self.kinds, len(self.objects))
+        by_packets = fast_of_few if precision == "fast" else closest_of_few
+        if self.packets and (precision == "fast" or n >= FEW_RAYS or is_compiled(by_packets)):
+            return self.with_room(by_packets, self.kinds, len(self.objects))
         if self.many and n >= MANY_RAYS:
             return self.with_room(closest_of_many)
         return partial(self.kernel(closest_of_rays), self.world)
 
     def any(self, n: int) -> Callable:
         """The kernel for any hit of n rays, with its scene."""
-        if self.packets:
+        if self.packets and (n >= FEW_RAYS or is_compiled(any_of_few)):
             return self.with_room(any_of_few, self.kinds, len(self.objects))
         if self.many and n >= MANY_RAYS:
             return self.with_room(any_of_many)

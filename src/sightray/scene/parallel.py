@@ -50,8 +50,9 @@ def _start(helpers: int, work: Callable[[], None]) -> list[Future]:
 def chunks_of(n: int, threads: int, chunk: int = 0) -> list[tuple[int, int]]:
     """First and last of the rays of each chunk; all begin at multiples of 256, because kernels take as many at a time."""
     chunks, first = [], 0
+    least = min(LEAST, max(FEW, n // (2 * threads)))  # of few rays, too, everybody gets some
     while first < n:
-        size = chunk or min(max((n - first) // (SHARE * threads), LEAST), MOST) // 256 * 256
+        size = chunk or min(max((n - first) // (SHARE * threads), least), MOST) // 256 * 256
         chunks.append((first, min(first + size, n)))
         first += size
     return chunks

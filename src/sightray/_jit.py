@@ -1,4 +1,4 @@
-"""How kernels are compiled, cached and called: the only file that knows.
+"""How kernels are compiled, cached and called: only this file and `_codegen` know.
 
 A kernel is a plain Python function with every argument and its result annotated (``f64 i64 Vec3 Table`` ...)::
 

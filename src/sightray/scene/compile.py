@@ -167,10 +167,10 @@ class Compiled:
         """Whether paths may be followed eight at once: no medium is about."""
         return self.scene.medium is None and are_for_eight(self.items, self._flags())
 
-    @property
+    @functools.cached_property
     def all_have_kinds(self) -> bool:
         """Whether all materials have forms for eight paths."""
-        return all(has_kind(item.material) for item in self.items)
+        return all(has_kind(material) for material in {id(item.material): item.material for item in self.items}.values())
 
     @functools.cached_property
     def in_pieces(self) -> bool:

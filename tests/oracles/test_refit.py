@@ -16,7 +16,7 @@ from sightray.bvh.binned_sah import unit_frame
 from sightray.bvh.bvh8 import CHILDREN, LEAF
 from sightray.bvh.refit import expected_cost, refit, refit_mesh
 from sightray.bvh.triangles import build_mesh
-from sightray.mathlib.table import Table
+from sightray.mathlib.table import Table, no_table
 
 DEFORMATIONS = ("same", "bent", "noise", "blown up", "far", "flat", "shuffled")
 
@@ -200,7 +200,7 @@ def test_python_and_machine_code_agree():
     for run in (refit, native(refit)):
         nodes, blocks = built.tree.nodes.copy(), built.blocks.copy()
         tables = Table(w), Table(built.faces), Table(np.array([*center, scale])), Table(built.numbers)
-        run(*tables, Table(nodes), len(nodes), Table(blocks))
+        run(*tables, no_table(), no_table(), Table(nodes), len(nodes), Table(blocks))
         found.append((nodes, blocks))
     for a, b in zip(*found, strict=True):
         np.testing.assert_array_equal(a, b)

@@ -47,6 +47,7 @@ from sightray.bvh.bvh8 import (
     visit_last,
 )
 from sightray.bvh.shadow_order import order_children
+from sightray.bvh.slivers import cut_slivers, put_box, unit_corner
 from sightray.mathlib.hit import Hit, is_hit, miss
 from sightray.mathlib.lanes import (
     F32x4,
@@ -74,7 +75,7 @@ from sightray.mathlib.table import (
     table_at,
 )
 from sightray.mathlib.tally import TESTS, tally
-from sightray.mathlib.vec import Vec3, rounded_cross, rounded_product
+from sightray.mathlib.vec import Vec3, rounded_cross, rounded_product, vmax, vmin
 
 BLOCK_FLOATS, EDGES, INDICES = 48, 12, 36
 SIDES, ALONGS = 10.0, 3.0  # slacks that the filter allows
@@ -90,6 +91,14 @@ TINY, SMALL, LARGE = 0, 1, 2  # trees that near caches hold; that farther ones h
 TINY_BLOCKS, SMALL_BLOCKS = 1 << 13, 1 << 16  # that these have at most
 
 
+class Cuts(NamedTuple):
+    """What refitting needs of a mesh whose slivers are cut (see `slivers`)."""
+
+    counts: np.ndarray  # (m,) int32: into how many pieces each triangle is cut
+    edges: np.ndarray  # (m,) int32: along which edge
+    pieces: np.ndarray  # (leaves, 4) int32: the piece in each lane of a block, -1 for none
+
+
 class MeshTree(NamedTuple):
     """All that rays need of a mesh."""
 
@@ -98,6 +107,7 @@ class MeshTree(NamedTuple):
     numbers: np.ndarray  # (leaves, 4) int32: the triangle in each lane of a block, -1 for none
     vertices: np.ndarray  # (n, 3) float64
     faces: np.ndarray  # (m, 3) int32
+    cuts: Cuts | None = None  # if triangles are cut; then some stand in several blocks
 
 
 def build_mesh(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
@@ -111,13 +121,18 @@ def build_mesh(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
     boxes = aligned((n, 8), np.float32)
     inputs = (Table(vertices), Table(faces), Table(frame))
     runnable(bound_triangles, n)(*inputs, n, Table(boxes))
-    nodes, order = build_tree(boxes, 4)
+    cut = cut_slivers(vertices, faces, frame, boxes)
+    nodes, order = build_tree(boxes if cut is None else cut.boxes, 4)
     leaves = int(np.count_nonzero(nodes.view(np.int32)[:, CHILDREN : CHILDREN + 8] >= LEAF))
-    blocks, numbers = aligned((leaves, BLOCK_FLOATS), np.float32), aligned((leaves, 4), np.int32)
-    runnable(pack_blocks, n)(*inputs, Table(nodes), len(nodes), Table(order), Table(blocks), Table(numbers))
+    blocks, pieces = aligned((leaves, BLOCK_FLOATS), np.float32), aligned((leaves, 4), np.int32)
+    runnable(name_blocks, n)(Table(nodes), len(nodes), Table(order), Table(pieces))
+    numbers = pieces if cut is None else np.where(pieces < 0, np.int32(-1), cut.triangle[pieces])
+    runnable(pack_blocks, n)(*inputs, Table(numbers), leaves, Table(blocks))
     worth = aligned((len(nodes), 2), np.float64)
     runnable(order_children, n)(Table(nodes), len(nodes), Table(blocks), BLOCK_FLOATS, Table(worth))
-    return MeshTree(Bvh8(nodes, order, center, half, scale), blocks, numbers, vertices, faces)
+    cuts = None if cut is None else Cuts(cut.counts, cut.edges, pieces)
+    tree = Bvh8(nodes, np.empty(0, np.int32), center, half, scale)  # leaves name blocks: no order is needed any more
+    return MeshTree(tree, blocks, numbers, vertices, faces, cuts)
 
 
 def pack_mesh(space: Space, row: Table, mesh: MeshTree) -> None:
@@ -142,21 +157,17 @@ def unit_vertex(vertices: Table, frame: Table, vertex: i64, axis: i64) -> f64:
 
 @kernel
 def bound_triangles(vertices: Table, faces: Table, frame: Table, n: i64, boxes: Table) -> None:
-    """Boxes of triangles as the builder wants them: lower corners and negated upper corners, in the unit frame."""
+    """Boxes of triangles as the builder wants them."""
     for i in range(n):
-        for axis in range(3):
-            a = unit_vertex(vertices, frame, int_at(faces, 3 * i), axis)
-            b = unit_vertex(vertices, frame, int_at(faces, 3 * i + 1), axis)
-            c = unit_vertex(vertices, frame, int_at(faces, 3 * i + 2), axis)
-            f32_put(boxes, 8 * i + axis, min(a, b, c))
-            f32_put(boxes, 8 * i + 4 + axis, -max(a, b, c))
+        a = unit_corner(vertices, frame, int_at(faces, 3 * i))
+        b = unit_corner(vertices, frame, int_at(faces, 3 * i + 1))
+        c = unit_corner(vertices, frame, int_at(faces, 3 * i + 2))
+        put_box(boxes, i, vmin(vmin(a, b), c), vmax(vmax(a, b), c))
 
 
 @kernel
-def pack_blocks(
-    vertices: Table, faces: Table, frame: Table, nodes: Table, n_nodes: i64, order: Table, blocks: Table, numbers: Table
-) -> None:
-    """Pack the triangles of each leaf into a block, and let the leaf name the block instead of its range."""
+def name_blocks(nodes: Table, n_nodes: i64, order: Table, pieces: Table) -> None:
+    """Let leaves name blocks instead of ranges, and note which of the items stands in each lane of a block."""
     block = 0
     for child in range(8 * n_nodes):
         at = child // 8 * NODE_FLOATS + CHILDREN + child % 8
@@ -164,11 +175,18 @@ def pack_blocks(
         if code >= LEAF:
             first, count = (code - LEAF) >> 3, code & 7
             for lane in range(4):
-                number = int_at(order, first + lane) if lane < count else -1
-                pack_triangle(vertices, faces, frame, number, blocks, block * BLOCK_FLOATS + lane)
-                i32_put(numbers, 4 * block + lane, number)
+                i32_put(pieces, 4 * block + lane, int_at(order, first + lane) if lane < count else -1)
             i32_put(nodes, at, LEAF + block)
             block += 1
+
+
+@kernel
+def pack_blocks(vertices: Table, faces: Table, frame: Table, numbers: Table, n_blocks: i64, blocks: Table) -> None:
+    """Pack the triangles of all leaves."""
+    for block in range(n_blocks):
+        for lane in range(4):
+            number = int_at(numbers, 4 * block + lane)
+            pack_triangle(vertices, faces, frame, number, blocks, block * BLOCK_FLOATS + lane)
 
 
 @kernel

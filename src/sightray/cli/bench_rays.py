@@ -116,7 +116,7 @@ def facts_of(case: Case) -> dict[str, Any]:
     vertices, faces = case.mesh
     shown = case.scene.objects[0]
     tree = getattr(shown, "of", shown).tree()
-    each = sum(a.nbytes for a in (tree.tree.nodes, tree.blocks, tree.numbers)) / len(faces)
+    each = sum(a.nbytes for a in (tree.tree.nodes, tree.blocks, tree.numbers, *(tree.cuts or ()))) / len(faces)
     return {
         "triangles": len(faces), **({} if case.places is None else {"instances": len(case.places)}),
         "bytes each triangle, tree and blocks": round(each, 1),

@@ -83,6 +83,32 @@ def cross_items(
 
 
 @kernel
+def drop_repeated(rows: Table, first: i64, end: i64) -> i64:
+    """Of sorted crossings keep one of those of the same primitive at the same place; the end of those kept.
+
+    A triangle that is cut (`bvh.slivers`) stands in several leaves.
+    """
+    kept = first
+    for i in range(first, end):
+        row, j = advance(rows, i * LAYER_WORDS), kept - 1
+        while j >= first and f64_at(rows, j * LAYER_WORDS) == f64_at(row, 0) and not is_same(rows, j, row):
+            j -= 1
+        if j >= first and f64_at(rows, j * LAYER_WORDS) == f64_at(row, 0):
+            continue
+        for word in range(LAYER_WORDS):
+            i64_put(rows, kept * LAYER_WORDS + word, i64_at(row, word))
+        kept += 1
+    return kept
+
+
+@kernel
+def is_same(rows: Table, j: i64, row: Table) -> bool:
+    """Whether crossing number j is of the item and the primitive of another."""
+    at = j * LAYER_WORDS
+    return i64_at(rows, at + 1) == i64_at(row, 1) and i64_at(rows, at + 2) == i64_at(row, 2)
+
+
+@kernel
 def tidy_order(rows: Table, first: i64, end: i64, o: Vec3, d: Vec3) -> None:
     """Where two crossings of an item are one in rounding, let it be entered before it is left.
 
@@ -122,6 +148,7 @@ def layers_of_rays(
         if after > capacity:
             return i
         sort_rows(rows, row, after - row, LAYER_WORDS)
+        after = drop_repeated(rows, row, after)
         tidy_order(rows, row, after, o, d)
         i64_put(counts, i, after - row)
         row = after
@@ -164,7 +191,7 @@ def count_of_rays(
     tree: Table, kinds: Table, origins: Table, o_form: i64, directions: Table, d_form: i64, ends: Table, e_form: i64,
     t_min: f64, n: i64, counts: Table, stop: Table,
 ) -> None:  # fmt: skip
-    """The number of crossings of each ray."""
+    """The number of crossings of each ray through a scene in whose meshes no triangle is cut."""
     for i in range(n):
         if i & LOOK == LOOK and i64_at(stop, 0) != 0:
             return

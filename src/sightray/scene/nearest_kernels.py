@@ -24,10 +24,11 @@ from sightray.bvh.nearest import push_nearest, to_unit
 from sightray.bvh.triangles import NUMBERS
 from sightray.mathlib.lanes import sort_key
 from sightray.mathlib.scalars import f64, i64
+from sightray.mathlib.sorting import sort_rows
 from sightray.mathlib.table import Table, f64_at, f64_put, i32_put, i64_at, i64_put, scratch, table_at
 from sightray.mathlib.vec import Vec3, dot
 from sightray.scene.crossings import LAYER_WORDS, MESH, mesh_corner, place
-from sightray.scene.layer_kernels import cross_items
+from sightray.scene.layer_kernels import cross_items, drop_repeated
 from sightray.scene.query_kernels import LOOK, put_triple, triple_at
 
 
@@ -192,6 +193,8 @@ def windings_of_points(
             count = cross_items(tree, kinds, p, d, 0.0, math.inf, rows, capacity, 0)
             if count > capacity:
                 return count
+            sort_rows(rows, 0, count, LAYER_WORDS)
+            count = drop_repeated(rows, 0, count)
             for row in range(count):
                 if int_at(kinds, i64_at(rows, row * LAYER_WORDS + 1)) == MESH:
                     total += 1 - 2 * i64_at(rows, row * LAYER_WORDS + 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,12 @@ class Asked:
         """A kernel of packets, with the rest of its scene, and with working memory for each thread."""
         run = partial(self.kernel(function), self.world, *scene)
         return lambda *arguments: run(*arguments, room())
+
+    @cached_property
+    def cut(self) -> bool:
+        """Whether a mesh has slivers that stand in several leaves."""
+        meshes = {id(item.shape): item.shape for item in self.compiled.items if isinstance(item.shape, Mesh)}
+        return any(mesh.tree().cuts is not None for mesh in meshes.values())
 
     def tree(self) -> Table:
         """A tree over the items as they are: that of the world may have put small meshes together."""
@@ -193,7 +199,7 @@ def occluded(
 def count(scene: Any, origins: Any, directions: Any, t_max: Any, t_min: Any, threads: Any) -> np.ndarray:
     rays, ready = Rays("count", origins, directions, t_max, t_min, "exact", threads), asked(scene)
     counts = np.zeros(rays.n, np.int64)
-    if ready.holes:
+    if ready.holes or ready.cut:
         _layers(ready, rays, counts, lambda first, rows: None)
         return counts.reshape(rays.shape)
     tree, run = ready.tree(), ready.kernel(count_of_rays)

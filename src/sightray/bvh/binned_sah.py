@@ -2,10 +2,12 @@
 
 All items are one range, which is split in two, and so on until at most `leaf_size` items are left. A split puts the items'
 centres into bins along each axis and takes the border between bins that minimises area x number of leaves, summed over
-both sides: the expected work of a ray that meets the range. Then `collapse` makes nodes of eight of the ranges.
+both sides: the expected work of a ray that meets the range. Then `reinsertion` moves ranges that lie badly, and `collapse`
+makes nodes of eight of them.
 
 Ranges with nothing to choose (all centres coincide) are halved as they lie. So are all below a number of levels, if a tree
-would otherwise be so deep that a ray's stack overflows, whatever the input: halving alone makes at most 26 levels.
+would otherwise be so deep that a ray's stack overflows, whatever the input: halving alone makes at most 26 levels. Before
+that, such a tree is tried without moving ranges.
 
 While building, a box is eight floats: its lower corner and 0, its negated upper corner and 0. So the union of two boxes is
 one minimum. A *range* of items (a child in the making, or what fell into a bin) is a row of its box and a count.
@@ -36,6 +38,7 @@ from sightray.bvh.collapse import (
     half_area,
     plan_ranges,
 )
+from sightray.bvh.reinsertion import reinsert
 from sightray.mathlib.lanes import (
     F32x4,
     extract4,
@@ -67,9 +70,12 @@ from sightray.mathlib.table import (
 )
 
 BINS = 16
-SAH_LEVELS = (48, 24, 0)  # levels divided by area; the next smaller number if a ray might need too high a stack
+# Levels divided by area, and whether ranges are moved; the next if a ray might need too high a stack.
+TRIES = ((48, True), (48, False), (24, False), (0, False))
 MAX_ITEMS = 1 << 26
 FEW = 64  # items that Python handles in a tenth of a second
+MOVED_FROM, MANY = 1 << 12, 1 << 16  # items: of fewer no ranges are moved, which takes half a second to compile, once
+SHARE, SHARE_OF_MANY = 0.1, 0.3  # ranges of less of the mean surface are not moved; among more than `MANY` items
 
 
 class Bvh8(NamedTuple):
@@ -122,12 +128,16 @@ def build_tree(boxes: np.ndarray, leaf_size: int) -> tuple[np.ndarray, np.ndarra
         raise ValueError(f"leaf size: got {leaf_size}; allowed: 1, 2, 4")
     order = np.arange(n, dtype=np.int32)
     ranges = aligned((max(2 * n, 2), RANGE_WORDS), np.int64)
-    for sah_levels in SAH_LEVELS:
+    for sah_levels, moving in TRIES:
         used = runnable(divide, n)(Table(boxes), Table(order), n, leaf_size, sah_levels, Table(ranges))
+        tree = ranges
+        if moving and n >= MOVED_FROM:
+            tree = aligned((used, RANGE_WORDS), np.int64)
+            runnable(reinsert, n)(Table(ranges), used, SHARE_OF_MANY if n > MANY else SHARE, Table(tree))
         plans = aligned((used, PLAN_WORDS), np.int64)
-        runnable(plan_ranges, n)(Table(ranges), used, Table(plans))
+        runnable(plan_ranges, n)(Table(tree), used, Table(plans))
         nodes = aligned((1 + used // 2, NODE_FLOATS), np.float32)
-        filled = runnable(collapse, n)(Table(ranges), Table(plans), leaf_size, Table(nodes))
+        filled = runnable(collapse, n)(Table(tree), Table(plans), leaf_size, Table(nodes))
         if filled > 0:
             break
     fitting = aligned((filled, NODE_FLOATS), np.float32)

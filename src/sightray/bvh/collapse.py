@@ -1,7 +1,8 @@
 """From a tree of two children a node to one of eight, of least expected cost for rays.
 
 A **range** of items is a row of `RANGE_WORDS` words: its box (eight floats: lower corner and 0, negated upper corner and 0),
-its first item and how many it has, and the number of its lower half; the upper half follows. A leaf has no halves.
+its first item and how many it has, and the number of its lower half; the upper half follows. A leaf has no halves. What a
+range with halves says of items holds only until `reinsertion` moves ranges: theirs need not follow each other after that.
 
 A node of eight takes in the halves of its range, halves of halves and so on. Which of them are to be nodes of their own is
 decided by dynamic programming. Let C(r, i) be the least cost of range r as at most i children of a node: for one child it is
@@ -24,7 +25,7 @@ from sightray.mathlib.lanes import F32x8, extract4, high4, load8, low4
 from sightray.mathlib.scalars import f64, i64
 from sightray.mathlib.table import Table, advance, f32_at, f32_put, i32_put, i64_at, i64_put, scratch
 
-FIRST, COUNT, HALVES, RANGE_WORDS = 4, 5, 6, 8  # words of a range after those of its box
+FIRST, COUNT, HALVES, PARENT, RANGE_WORDS = 4, 5, 6, 7, 8  # words of a range after those of its box; see `reinsertion`
 PLAN_WORDS = 8  # of a range's plan: C(r, i) as float i for i < 8, and as 32-bit integer 7 + i the lower half's places k
 
 

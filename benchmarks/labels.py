@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 import sightray as sr
+from sightray.mathlib.cores import core_count
 from sightray.scene.compile import flatten
-from sightray.scene.parallel import core_count
 
 SETS = (("depth",), ("normal",), ("instance",), ("flow",), ("depth", "normal", "instance", "flow"))
 TIMES = 15

@@ -366,7 +366,7 @@ def test_nodes_of_eight_cost_the_least():
         corner = rng.uniform(-1, 0.6, (n, 3))
         boxes[:, :3], boxes[:, 4:7] = corner, -corner - rng.uniform(0, 0.4, (n, 3))
         order, ranges = np.arange(n, dtype=np.int32), aligned((2 * n, 8), np.int64)
-        used = divide(Table(boxes), Table(order), n, 1, 48, Table(ranges))
+        used = divide(Table(boxes), Table(order), n, 1, 1, 48, Table(ranges))
         plans, nodes = aligned((used, 8), np.int64), aligned((used, 64), np.float32)
         plan_ranges(Table(ranges), used, Table(plans))
         filled = collapse(Table(ranges), Table(plans), 1, Table(nodes))
@@ -433,7 +433,7 @@ def test_builder_in_python_and_machine_code_agree():
         corner = np.random.default_rng(10).uniform(-1, 0.9, (50, 3))
         boxes[:, :3], boxes[:, 4:7] = corner, -corner - 0.1
         order, ranges = np.arange(50, dtype=np.int32), aligned((100, 8), np.int64)
-        used = compiled(divide)(Table(boxes), Table(order), 50, 4, 48, Table(ranges))
+        used = compiled(divide)(Table(boxes), Table(order), 50, 4, 4, 48, Table(ranges))
         plans, nodes = aligned((used, 8), np.int64), aligned((64, 64), np.float32)
         compiled(plan_ranges)(Table(ranges), used, Table(plans))
         filled = compiled(collapse)(Table(ranges), Table(plans), 4, Table(nodes))
@@ -499,3 +499,48 @@ def test_items_against_single_spheres():
         assert (items[hit, 0] == expected.argmin(axis=1)[hit]).all()
         assert (items[~hit, 0] == -1).all()
         assert (items[:, 1] == hit).all()
+
+
+@pytest.mark.parametrize("leaf_size", [1, 2, 4])
+@pytest.mark.parametrize("threads", [2, 5])
+def test_several_threads_build_the_tree_of_one(monkeypatch, leaf_size, threads):
+    """The same nodes and the same order of items to the last bit; many items lie in one place, some far away."""
+    rng = np.random.default_rng(14)
+    n = 5000
+    low = rng.uniform(-1, 1, (n, 3))
+    low[:700] = 0.25
+    low[700:900] = 50 * rng.normal(size=(200, 3))
+    high = low + rng.uniform(0, 0.1, (n, 3))
+    alone = build(low, high, leaf_size)
+    monkeypatch.setattr(binned_sah, "SHARED_FROM", 1000)
+    monkeypatch.setattr(binned_sah, "core_count", lambda: threads)
+    together = build(low, high, leaf_size)
+    assert np.array_equal(alone.order, together.order)
+    assert alone.nodes[:, :56].tobytes() == together.nodes[:, :56].tobytes()
+    parts = binned_sah.divide_items(boxes_of(low, high), np.arange(n, dtype=np.int32), leaf_size, 48)
+    assert parts[parts[:, HALVES] == 0, COUNT].sum() == n
+    assert parts[parts[:, HALVES] == 0, COUNT].max() <= leaf_size
+
+
+def test_the_limit_of_levels_holds_within_the_parts_of_threads(monkeypatch):
+    """Items of which every split takes off but one: as deep as levels are allowed by area, then halved."""
+    n = 3000
+    low = np.outer(0.9 ** np.arange(n), [1.0, 1.0, 1.0])
+    heights = []
+    for shared_from in (1 << 30, 1000):
+        monkeypatch.setattr(binned_sah, "SHARED_FROM", shared_from)
+        monkeypatch.setattr(binned_sah, "core_count", lambda: 2)
+        ranges = binned_sah.divide_items(boxes_of(low, low), np.arange(n, dtype=np.int32), 1, 20)
+        levels = np.zeros(len(ranges), np.int64)
+        for r in np.flatnonzero(ranges[:, HALVES]):
+            levels[ranges[r, HALVES] : ranges[r, HALVES] + 2] = levels[r] + 1
+        heights.append(levels.max())
+    assert heights[0] == heights[1]
+    assert heights[0] > 20
+
+
+def boxes_of(low, high):
+    """Boxes as the builder takes them."""
+    boxes = aligned((len(low), 8), np.float32)
+    boxes[:, :3], boxes[:, 4:7] = low, -high
+    return boxes

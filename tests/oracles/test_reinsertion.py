@@ -32,7 +32,7 @@ def binary_tree(boxes, leaf_size=1, levels=48):
     """Ranges of a tree over boxes, which are permuted, with parents."""
     n = len(boxes)
     order, ranges = np.arange(n, dtype=np.int32), aligned((2 * n, 8), np.int64)
-    used = native(divide)(Table(boxes), Table(order), n, leaf_size, levels, Table(ranges))
+    used = native(divide)(Table(boxes), Table(order), n, leaf_size, leaf_size, levels, Table(ranges))
     fitting = aligned((used, 8), np.int64)
     fitting[:] = ranges[:used]
     for r in range(used):
@@ -191,7 +191,7 @@ def height(nodes):
 def nested(n):
     """Boxes within one another, which cost least as a chain."""
     boxes = aligned((n, 8), np.float32)
-    boxes[:, 4:7] = -np.outer(0.995 ** np.arange(n), [1.0, 0.9, 0.8])
+    boxes[:, 4:7] = -np.outer(0.99 ** np.arange(n), [1.0, 0.9, 0.8])
     return boxes
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,7 @@ from sightray.bvh.collapse import (
     plan_ranges,
 )
 from sightray.bvh.reinsertion import reinsert
+from sightray.mathlib.cores import core_count
 from sightray.mathlib.lanes import (
     F32x4,
     extract4,
@@ -74,6 +76,7 @@ BINS = 16
 TRIES = ((48, True), (48, False), (24, False), (0, False))
 MAX_ITEMS = 1 << 26
 FEW = 64  # items that Python handles in a tenth of a second
+SHARED_FROM = 1 << 15  # items that several threads divide
 MOVED_FROM, MANY = 1 << 12, 1 << 16  # items: of fewer no ranges are moved, which takes half a second to compile, once
 SHARE, SHARE_OF_MANY = 0.1, 0.3  # ranges of less of the mean surface are not moved; among more than `MANY` items
 
@@ -127,10 +130,9 @@ def build_tree(boxes: np.ndarray, leaf_size: int) -> tuple[np.ndarray, np.ndarra
     if leaf_size not in (1, 2, 4):
         raise ValueError(f"leaf size: got {leaf_size}; allowed: 1, 2, 4")
     order = np.arange(n, dtype=np.int32)
-    ranges = aligned((max(2 * n, 2), RANGE_WORDS), np.int64)
     for sah_levels, moving in TRIES:
-        used = runnable(divide, n)(Table(boxes), Table(order), n, leaf_size, sah_levels, Table(ranges))
-        tree = ranges
+        ranges = tree = divide_items(boxes, order, leaf_size, sah_levels)
+        used = len(ranges)
         if moving and n >= MOVED_FROM:
             tree = aligned((used, RANGE_WORDS), np.int64)
             runnable(reinsert, n)(Table(ranges), used, SHARE_OF_MANY if n > MANY else SHARE, Table(tree))
@@ -143,6 +145,55 @@ def build_tree(boxes: np.ndarray, leaf_size: int) -> tuple[np.ndarray, np.ndarra
     fitting = aligned((filled, NODE_FLOATS), np.float32)
     fitting[:] = nodes[:filled]
     return fitting, order
+
+
+def divide_items(boxes: np.ndarray, order: np.ndarray, leaf_size: int, sah_levels: int) -> np.ndarray:
+    """Divide all items into ranges, (m, 8) int64, permuting them; where they are many, parts by several threads."""
+    n, threads = len(boxes), core_count() if len(boxes) >= SHARED_FROM else 1
+    ranges = divide_part(boxes, order, leaf_size, n // (2 * threads) if threads > 1 else leaf_size, sah_levels)
+    if threads == 1:
+        return ranges
+    levels = np.zeros(len(ranges), np.int64)
+    for r in np.flatnonzero(ranges[:, HALVES]):
+        levels[ranges[r, HALVES] : ranges[r, HALVES] + 2] = levels[r] + 1
+    parts = np.flatnonzero((ranges[:, HALVES] == 0) & (ranges[:, COUNT] > leaf_size))
+    parts = parts[np.argsort(-ranges[parts, COUNT], kind="stable")]  # the largest first, so that all end together
+
+    def finish(r: int) -> np.ndarray:
+        items = slice(ranges[r, FIRST], ranges[r, FIRST] + ranges[r, COUNT])
+        return divide_part(boxes[items], order[items], leaf_size, leaf_size, max(sah_levels - int(levels[r]), 0))
+
+    with ThreadPoolExecutor(threads) as pool:
+        return join_parts(ranges, dict(zip(parts.tolist(), pool.map(finish, parts), strict=True)))
+
+
+def divide_part(boxes: np.ndarray, order: np.ndarray, leaf_size: int, small: int, sah_levels: int) -> np.ndarray:
+    """Divide items into ranges of at most `small`."""
+    n = len(boxes)
+    ranges = aligned((max(2 * n, 2), RANGE_WORDS), np.int64)
+    inputs = Table(boxes), Table(order), n, leaf_size, small, sah_levels
+    return ranges[: runnable(divide, n)(*inputs, Table(ranges))]
+
+
+def join_parts(top: np.ndarray, parts: dict[int, np.ndarray]) -> np.ndarray:
+    """One tree of its uppermost ranges and of what some of these were divided into, numbered as `divide` would do."""
+    ranges = aligned((len(top) + sum(len(part) - 1 for part in parts.values()), RANGE_WORDS), np.int64)
+    ranges[0], used, todo = top[0], 1, [(0, 0)]
+    while todo:
+        r, number = todo.pop()
+        if (part := parts.get(r)) is not None:
+            rest = ranges[used : used + len(part) - 1]
+            rest[:] = part[1:]
+            rest[:, FIRST] += top[r, FIRST]
+            rest[:, HALVES] += np.where(rest[:, HALVES] > 0, used - 1, 0)
+            ranges[number, HALVES] = used
+            used += len(rest)
+        elif top[r, HALVES] > 0:
+            lower = int(top[r, HALVES])
+            ranges[used : used + 2], ranges[number, HALVES] = top[lower : lower + 2], used
+            todo += [(lower, used), (lower + 1, used + 1)]
+            used += 2
+    return ranges
 
 
 def runnable(function: Callable, n: int) -> Callable:
@@ -163,8 +214,10 @@ def pack_tree(space: Space, row: Table, tree: Bvh8) -> None:
 
 
 @kernel
-def divide(boxes: Table, order: Table, n: i64, leaf_size: i64, sah_levels: i64, ranges: Table) -> i64:
-    """Divide all items into ranges of at most `leaf_size` (see `collapse`), permuting them; the number of ranges."""
+def divide(
+    boxes: Table, order: Table, n: i64, leaf_size: i64, small: i64, sah_levels: i64, ranges: Table
+) -> i64:  # fmt: skip
+    """Divide n items into ranges of at most `small` (see `collapse`), permuting them; the number of ranges."""
     todo = scratch(256)  # ranges to divide, and their levels
     set_range(boxes, ranges, 0, n)
     i64_put(todo, 0, 0)
@@ -173,7 +226,7 @@ def divide(boxes: Table, order: Table, n: i64, leaf_size: i64, sah_levels: i64, 
     while top > 0:
         top -= 1
         row, level = advance(ranges, i64_at(todo, 2 * top) * RANGE_WORDS), i64_at(todo, 2 * top + 1)
-        if i64_at(row, COUNT) <= leaf_size:
+        if i64_at(row, COUNT) <= small:
             i64_put(row, HALVES, 0)
             continue
         i64_put(row, HALVES, used)

@@ -37,7 +37,7 @@ from sightray.mathlib.table import Table, advance, f64_at, f64_put, i64_at, i64_
 
 ROUNDS = 2
 ROOM = 128  # ranges that a search has open at most: where a tree is so deep, it looks no further down
-LOOKS, MOST_LOOKS = 96, 512  # at ranges: for each range that there is, and on the way down in one search
+LOOKS, MOST_LOOKS = 32, 512  # at ranges: for each range that there is, and on the way down in one search
 WORTH = 0.01  # of the surface, that all moves together save at least; otherwise the tree stays as it was
 LEAST_GAIN = 1e-9  # of surface, in the unit frame, that is worth a move
 

@@ -40,7 +40,7 @@ from sightray.mathlib.vec import Vec3, cross, dot, vabs, vmax, vmin
 
 SLIVER, FINE, MOST, GROWTH = 8.0, 2.0, 64, 2.0
 FEWEST = 128  # triangles of a mesh for which no tree is walked
-ROUNDS = 24  # of narrowing down how fine triangles may be cut
+ROUNDS = 12  # of narrowing down how fine triangles may be cut
 
 
 class Pieces(NamedTuple):

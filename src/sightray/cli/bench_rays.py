@@ -139,7 +139,7 @@ def warm_up(threads: int) -> None:
 def rays(peers: bool, json: bool, case: str = "balls", threads: int | None = None, rounds: int = ROUNDS) -> None:
     """Measure rays each second through `Scene.intersect` and `Scene.occluded`, beside other ray tracers if asked."""
     from sightray.cli.bench_cases import CASES
-    from sightray.scene.parallel import core_count
+    from sightray.mathlib.cores import core_count
 
     names = list(CASES) if case == "all" else [name.strip() for name in case.split(",")]
     warm_up(threads or core_count())

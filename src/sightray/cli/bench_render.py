@@ -174,7 +174,7 @@ def _save(picture: np.ndarray, path: Path) -> None:
 def render(peers: bool, json: bool, folder: Path | None, only: str | None, peer_python: Path | None = None) -> None:
     """Measure, and print a table or JSON. `peer_python` has what this Python has not: Blender's ``bpy``."""
     from sightray.cli.bench_cycles import PYTHON
-    from sightray.scene.parallel import core_count
+    from sightray.mathlib.cores import core_count
 
     if peer_python is not None:
         os.environ[PYTHON] = str(peer_python)

@@ -139,7 +139,7 @@ def efficiency(rows: list[Row], row: Row) -> list[float]:
 
 def scaling(json: bool, plot: Path | None, largest: int, rounds: int = ROUNDS) -> None:
     """Measure and print the three tables, and draw them."""
-    from sightray.scene.parallel import core_count
+    from sightray.mathlib.cores import core_count
 
     warm_up(core_count())
     threads, triangles = over_threads(core_count(), rounds), over_triangles(largest, rounds)

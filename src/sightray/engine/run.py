@@ -21,9 +21,9 @@ from sightray.film.film import Film
 from sightray.filters.table import filter_table
 from sightray.images import Image
 from sightray.integrators.base import radiance_of_batch
+from sightray.mathlib.cores import core_count
 from sightray.mathlib.table import Space, Table, aligned
 from sightray.scene.compile import Compiled, require_camera
-from sightray.scene.parallel import core_count
 
 TILE = 32  # pixels; a tile of a simple scene takes a few milliseconds
 # Where integrators want pixels together, edges of tiles cut them apart. So tiles are wide, and lie elsewhere in each pass

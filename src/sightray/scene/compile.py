@@ -16,6 +16,7 @@ from sightray.accelerators import item as item_row
 from sightray.errors import SceneError
 from sightray.lights.base import Light
 from sightray.materials.lambert import Lambert
+from sightray.mathlib.cores import core_count
 from sightray.mathlib.motion import Placement
 from sightray.mathlib.table import Space, Table, aligned, link, set_methods
 from sightray.mathlib.transform import IDENTITY, Transform, put_columns
@@ -25,7 +26,6 @@ from sightray.scene.instance import Group, Instance
 from sightray.scene.kinds import are_for_eight, has_kind, kinds_of, pack_kinds
 from sightray.scene.lighting import pack_glow, pack_lamps
 from sightray.scene.merge import merge_small_meshes
-from sightray.scene.parallel import core_count
 from sightray.scene.pieces import MOST, pack_pieces, pieces_of
 from sightray.scene.scene import Scene
 from sightray.scene.world import light_count

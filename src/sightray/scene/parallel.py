@@ -10,6 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 import numpy as np
 
+from sightray.mathlib.cores import core_count
 from sightray.mathlib.table import Table, aligned
 
 FEW = 2048  # rays that are not worth waking a thread: a tenth of a millisecond
@@ -21,11 +22,6 @@ _NEVER = Table(aligned(1, np.int64))  # the stop word of small batches
 _lock = threading.Lock()
 _pool: ThreadPoolExecutor | None = None
 _pool_size = 0
-
-
-def core_count() -> int:
-    """Cores that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _forget_pool() -> None:

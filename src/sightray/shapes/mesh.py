@@ -78,10 +78,7 @@ class Mesh(Shape):
             bad = int(np.flatnonzero(((self.faces < 0) | (self.faces >= n)).any(axis=1))[0])
             raise SceneError(f"Mesh.faces: row {bad}: got {self.faces[bad].tolist()}; allowed: numbers 0 to {n - 1}")
 
-        # Drop what has no area.
-        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
-        longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-        keep = np.linalg.norm(np.cross(b - a, c - a), axis=1) > _SLIVER * longest
+        keep = _have_area(self.vertices, self.faces)
         object.__setattr__(self, "dropped", int(len(keep) - keep.sum()))
         if not keep.any():
             raise SceneError(f"Mesh.faces: got {len(keep)} triangles, none with an area; allowed: at least one")
@@ -171,6 +168,15 @@ class Mesh(Shape):
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         points = self._used()[0]
         return points.min(axis=0), points.max(axis=0)
+
+
+def _have_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Which triangles have an area; by axis, which takes half the time of `numpy.cross`."""
+    a, b, c = (np.ascontiguousarray(vertices[faces[:, corner]].T) for corner in range(3))
+    p, q, r = b - a, c - b, a - c
+    longest = np.max([x * x + y * y + z * z for x, y, z in (p, q, r)], axis=0)
+    x, y, z = p[1] * r[2] - p[2] * r[1], p[2] * r[0] - p[0] * r[2], p[0] * r[1] - p[1] * r[0]
+    return np.sqrt(x * x + y * y + z * z) > _SLIVER * longest
 
 
 TREE_HEAD, VERTICES_GIVEN, FACES_GIVEN, NORMALS, UVS = Mesh.offsets()

@@ -130,7 +130,7 @@ class Placement(NamedTuple):
 
     def within(self, transform: Transform, motion: Motion | None) -> Placement:
         """What is placed by `transform`, and moved before that, inside of what stands here."""
-        last = self.last if transform.is_identity else self.last @ transform
+        last = transform if self.last is IDENTITY else self.last if transform.is_identity else self.last @ transform
         if motion is None:
             return Placement(self.moves, last)
         return Placement((*self.moves, (last, motion)), IDENTITY)

@@ -101,7 +101,7 @@ class Transform:
     @property
     def is_identity(self) -> bool:
         """Whether nothing moves."""
-        return self is IDENTITY or bool((self.matrix == np.eye(4)).all())
+        return self is IDENTITY or bool((self.matrix == IDENTITY.matrix).all())
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Transform) and bool((self.matrix == other.matrix).all())

@@ -166,8 +166,12 @@ class Mesh(Shape):
         return self.vertices[used], (np.cumsum(used) - 1).astype(np.int32)[self.faces]
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        points = self._used()[0]
-        return points.min(axis=0), points.max(axis=0)
+        if "_bounds" not in vars(self):  # a mesh may be shown ten thousand times
+            points = self._used()[0]
+            lower, upper = points.min(axis=0), points.max(axis=0)
+            lower.flags.writeable = upper.flags.writeable = False
+            object.__setattr__(self, "_bounds", (lower, upper))
+        return vars(self)["_bounds"]
 
 
 def _have_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -24,12 +24,14 @@ I. Wald, "Watertight ray/triangle intersection" (JCGT 2013).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from sightray._jit import kernel
-from sightray.bvh.binned_sah import Bvh8, build_tree, pack_tree, runnable, unit_frame
+from sightray._compilers import compile_missing
+from sightray._jit import enabled, kernel
+from sightray.bvh.binned_sah import FEW, MOVED_FROM, Bvh8, build_tree, divide, pack_tree, runnable, unit_frame
 from sightray.bvh.bvh8 import (
     BOTTOM,
     CHILD,
@@ -46,8 +48,11 @@ from sightray.bvh.bvh8 import (
     unit_ray,
     visit_last,
 )
+from sightray.bvh.collapse import collapse, plan_ranges
+from sightray.bvh.reinsertion import reinsert
 from sightray.bvh.shadow_order import order_children
-from sightray.bvh.slivers import cut_slivers, put_box, unit_corner
+from sightray.bvh.slivers import FEWEST, count_pieces, cut_slivers, measure_triangles, put_box, unit_corner
+from sightray.mathlib.cores import core_count
 from sightray.mathlib.hit import Hit, is_hit, miss
 from sightray.mathlib.lanes import (
     F32x4,
@@ -115,6 +120,8 @@ def build_mesh(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
     vertices = np.ascontiguousarray(vertices, np.float64)
     faces = np.ascontiguousarray(faces, np.int32)
     n = len(faces)
+    if enabled():
+        compile_missing(builders(n), core_count())
     corners = (vertices.min(axis=0), vertices.max(axis=0)) if len(vertices) else (np.zeros(3), np.zeros(3))
     center, half, scale = unit_frame(*corners)
     frame = np.array([*center, scale])
@@ -133,6 +140,16 @@ def build_mesh(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
     cuts = None if cut is None else Cuts(cut.counts, cut.edges, pieces)
     tree = Bvh8(nodes, np.empty(0, np.int32), center, half, scale)  # leaves name blocks: no order is needed any more
     return MeshTree(tree, blocks, numbers, vertices, faces, cuts)
+
+
+def builders(n: int) -> list[Callable]:
+    """The kernels that make a tree over n triangles."""
+    if n <= FEW:
+        return []
+    kernels: list[Callable] = [bound_triangles, divide, plan_ranges, collapse, name_blocks, pack_blocks, order_children]
+    if n > FEWEST:
+        kernels += [measure_triangles, count_pieces]
+    return [*kernels, reinsert] if n >= MOVED_FROM else kernels
 
 
 def pack_mesh(space: Space, row: Table, mesh: MeshTree) -> None:

@@ -463,6 +463,18 @@ def test_mesh_drops_triangles_without_area_and_ignores_strays():
     assert make(vertices=vertices, faces=mesh.faces).dropped == 0
 
 
+def test_corners_on_one_line_have_no_area_whatever_its_direction():
+    rng = np.random.default_rng(3)
+    start, along = rng.integers(-8, 8, (200, 3)), rng.integers(1, 9, (200, 3)) * rng.choice([-1, 1], (200, 3))
+    on_a_line = start[:, None] + along[:, None] * np.array([[0], [1], [3]])  # whole numbers: exactly
+    thin = on_a_line + np.array([[0, 0, 0], [1e-9, -1e-9, 2e-9], [0, 0, 0]])
+    vertices = np.concatenate([on_a_line, thin]).reshape(-1, 3)
+    with pytest.warns(UserWarning, match="200 triangles without area"):
+        mesh = members("shapes")["Mesh"](vertices=vertices, faces=np.arange(1200).reshape(-1, 3))
+    assert mesh.dropped == 200
+    assert mesh.faces[:, 0].tolist() == list(range(600, 1200, 3))
+
+
 def test_mesh_shading_interpolates_normals_and_uvs():
     example = EXAMPLES["Mesh"][1]
     o, d = rays_for(example.shape, 40, easy=True)

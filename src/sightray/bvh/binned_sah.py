@@ -85,7 +85,7 @@ class Bvh8(NamedTuple):
     """A tree over boxes; see `bvh8` for what it means."""
 
     nodes: np.ndarray  # (m, 64) float32 on a cache line; children are integers
-    order: np.ndarray  # (n,) int32: leaves are ranges of this permutation of the items
+    order: np.ndarray  # (n,) int32: leaves are ranges of this permutation of the items; empty if they name blocks
     center: np.ndarray  # (3,) float64
     half: np.ndarray  # (3,) float64, in the unit frame
     scale: float
